@@ -1,0 +1,121 @@
+"""The kinds of limit that a trajectory can be held to, and the values of one vehicle.
+
+`Limits` is an open set: a kind is one entry of `KINDS`, one optional field of `Limits`, one unit
+in `kernels/measures.py` (what the optimisers see) and one in `kernels/bounds.py` (what the
+certificate proves). Everything else, from the report to the command line, goes through `KINDS`.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from peakflight.errors import InvalidProblem
+
+GRAVITY = 9.81
+"""Acceleration of gravity, m/s^2."""
+
+
+class LimitKind(NamedTuple):
+    """What one kind of limit is called, measured in and derived from."""
+
+    name: str
+    unit: str
+    order: int
+    """Highest derivative of position that it depends on."""
+    label: str
+    """For tables and axes."""
+
+
+KINDS = (
+    LimitKind("speed", "m/s", 1, "speed"),
+    LimitKind("thrust_acceleration", "m/s^2", 2, "thrust acceleration"),
+    LimitKind("jerk", "m/s^3", 3, "jerk"),
+    LimitKind("snap", "m/s^4", 4, "snap"),
+    LimitKind("tilt", "rad", 2, "tilt"),
+    LimitKind("least_thrust_acceleration", "m/s^2", 2, "least thrust acceleration"),
+)
+"""In the order in which kernels number them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What a trajectory may not exceed, anywhere. A field left at None does not limit.
+
+    Raises
+    ------
+    InvalidProblem
+        If a value is not a positive finite number, breaks the rule beside its field, or if no
+        limit bounds how fast the flight can be.
+    """
+
+    speed: float | None = None
+    """Largest |v|, m/s (Eq. kapp_i, s = 1)."""
+    thrust_acceleration: float | None = None
+    """Largest |a + g e3|, m/s^2, above g (Eq. kappa2, Remark 1)."""
+    jerk: float | None = None
+    """Largest |j|, m/s^3 (Eq. kapp_i, s = 3)."""
+    snap: float | None = None
+    """Largest |s|, m/s^4 (Eq. kapp_i, s = 4)."""
+    tilt: float | None = None
+    """Largest angle of a + g e3 from the vertical, rad, below pi/2."""
+    least_thrust_acceleration: float | None = None
+    """Smallest |a + g e3|, m/s^2, below g."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is not None:
+                object.__setattr__(self, field.name, _positive(field.name, value))
+        if self.thrust_acceleration is not None and self.thrust_acceleration <= GRAVITY:
+            raise InvalidProblem(
+                f"limit thrust_acceleration is {self.thrust_acceleration:g} m/s^2; it must be "
+                f"above gravity ({GRAVITY} m/s^2), or the vehicle cannot hover"
+            )
+        if self.tilt is not None and self.tilt >= math.pi / 2:
+            raise InvalidProblem(
+                f"limit tilt is {self.tilt:g} rad; it must be below pi/2 (write 50deg for degrees)"
+            )
+        least = self.least_thrust_acceleration
+        if least is not None and least >= GRAVITY:
+            raise InvalidProblem(
+                f"limit least_thrust_acceleration is {least:g} m/s^2; it must be below gravity "
+                f"({GRAVITY} m/s^2), or the vehicle cannot hover"
+            )
+        if not self.active:
+            raise InvalidProblem("no limit is set; set at least one, such as speed=5.0")
+
+    @property
+    def active(self) -> tuple[LimitKind, ...]:
+        """The kinds that are set, in the order of `KINDS`."""
+        return tuple(kind for kind in KINDS if getattr(self, kind.name) is not None)
+
+    def as_array(self) -> np.ndarray:
+        """Values in the order of `KINDS`, shape (len(KINDS),); NaN where nothing is limited."""
+        values = (getattr(self, kind.name) for kind in KINDS)
+        return np.array([math.nan if value is None else value for value in values])
+
+    def to_dict(self) -> dict[str, float]:
+        """The limits that are set, by name."""
+        return {kind.name: getattr(self, kind.name) for kind in self.active}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Limits by name, as `to_dict` gives them."""
+        known = [kind.name for kind in KINDS]
+        for name in values:
+            if name not in known:
+                raise InvalidProblem(f"unknown limit {name!r}; known are {', '.join(known)}")
+        return cls(**values)
+
+
+def _positive(name: str, value: Any) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InvalidProblem(f"limit {name} is {value!r}; it must be a number") from None
+    if not (math.isfinite(number) and number > 0.0):
+        raise InvalidProblem(f"limit {name} is {number:g}; it must be positive and finite")
+    return number

@@ -1,0 +1,342 @@
+"""What is asked: waypoints, limits, and the class of spline that answers."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from peakflight.errors import InvalidProblem
+from peakflight.limits import Limits
+
+DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
+"""Names of the derivatives of position, by order."""
+DEGREES = range(3, 12)
+"""Degrees of polynomial that are supported."""
+AXES = "xyz"
+
+StateLike: TypeAlias = Mapping[str | int, ArrayLike] | ArrayLike
+"""Derivatives at a waypoint: by name or order, or an array (n, D) from velocity on. NaN is free."""
+
+
+class SplineClass(NamedTuple):
+    """The polynomials that sub-problem 1 chooses from, and the cost by which it chooses."""
+
+    degree: int
+    """Degree N of each polynomial."""
+    weights: tuple[float, ...]
+    """Weights c_0..c_N on the squared derivatives (Eq. minfuncP)."""
+    continuity: int
+    """Highest derivative that is continuous at the waypoints."""
+
+    @property
+    def end_orders(self) -> int:
+        """Derivatives 1..n that a vehicle at rest has at zero: those that end data can hold."""
+        return (self.degree - 1) // 2
+
+    @property
+    def cost_order(self) -> int:
+        """The highest derivative that the cost weighs."""
+        return max(order for order, weight in enumerate(self.weights) if weight > 0.0)
+
+    @property
+    def is_homogeneous(self) -> bool:
+        """Whether the cost weighs one derivative only, so that no time scale is built in."""
+        return sum(weight > 0.0 for weight in self.weights) == 1
+
+    @property
+    def is_classical(self) -> bool:
+        """Whether the optimum is the C^(2r-2) spline of degree 2r-1 for a cost on the r-th."""
+        r = self.cost_order
+        return (
+            self.is_homogeneous
+            and self.degree == 2 * r - 1
+            and r - 1 <= self.continuity <= 2 * r - 2
+        )
+
+    @classmethod
+    def of(
+        cls,
+        minimize: str | Mapping[str | int, float] | Sequence[float] = "jerk",
+        degree: int | None = None,
+        continuity: int | None = None,
+    ) -> Self:
+        """Fill in what is not given and check that the three go together.
+
+        Parameters
+        ----------
+        minimize
+            "acceleration", "jerk" or "snap"; weights by name or order, as {"jerk": 1, 4: 0.01};
+            or the sequence c_0..c_N of Eq. minfuncP.
+        degree
+            3 to 11. By default 2r-1 for a cost on the r-th derivative: 5 for jerk, 7 for snap.
+        continuity
+            By default what the optimum itself has, 2r-2, where the degree allows it; else
+            degree - 2 (C3 for minimum snap at degree 5, as in the paper).
+        """
+        weights = _weights(minimize)
+        order = max(weights)
+        if degree is None:
+            degree = max(2 * order - 1, DEGREES[0])
+        degree = _integer("degree", degree)
+        if degree not in DEGREES:
+            raise InvalidProblem(
+                f"degree is {degree}; it must be {DEGREES[0]} to {DEGREES[-1]}"
+            )
+        if order > degree:
+            raise InvalidProblem(
+                f"minimize weighs derivative {order}, which is zero at degree {degree}"
+            )
+        if continuity is None:
+            continuity = 2 * order - 2 if degree >= 2 * order - 1 else degree - 2
+        continuity = _integer("continuity", continuity)
+        if not 0 <= continuity < degree:
+            raise InvalidProblem(
+                f"continuity is {continuity}; degree {degree} allows 0 to {degree - 1}"
+            )
+        return cls(degree, tuple(weights.get(s, 0.0) for s in range(degree + 1)), continuity)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Waypoints to pass in order, limits to keep, and the class of spline that does it.
+
+    Raises
+    ------
+    InvalidProblem
+        If a value is missing, not finite, of the wrong shape or against a rule; the message
+        names the index, the value and the rule.
+    """
+
+    waypoints: np.ndarray
+    """(K+1, 3) m, z up; two at least, no two in a row alike."""
+    limits: Limits = field(kw_only=True)
+    minimize: str | Mapping[str | int, float] | Sequence[float] = field(
+        default="jerk", kw_only=True
+    )
+    """The cost of sub-problem 1; see `SplineClass.of`."""
+    degree: int | None = field(default=None, kw_only=True)
+    """Degree of the polynomials; None picks the natural one for the cost."""
+    continuity: int | None = field(default=None, kw_only=True)
+    """Highest continuous derivative; None picks the natural one."""
+    start: StateLike | None = field(default=None, kw_only=True)
+    """Derivatives at the first waypoint; None is rest. Orders left out are zero, NaN is free."""
+    end: StateLike | None = field(default=None, kw_only=True)
+    """Derivatives at the last waypoint; as for `start`."""
+    derivatives: Mapping[int, StateLike] = field(default_factory=dict, kw_only=True)
+    """Derivatives at inner waypoints, by index; whatever is left out is free."""
+    yaw: np.ndarray | None = field(default=None, kw_only=True)
+    """(K+1,) rad, heading at each waypoint; carried to the outputs."""
+
+    def __post_init__(self) -> None:
+        waypoints = _waypoints(self.waypoints)
+        legs, axes = len(waypoints) - 1, waypoints.shape[1]
+        object.__setattr__(self, "waypoints", waypoints)
+        if not isinstance(self.limits, Limits):
+            raise InvalidProblem(f"limits is {self.limits!r}; it must be a peakflight.Limits")
+        spline_class = SplineClass.of(self.minimize, self.degree, self.continuity)
+        object.__setattr__(self, "degree", spline_class.degree)
+        object.__setattr__(self, "continuity", spline_class.continuity)
+        if self.yaw is not None:
+            object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
+        rest = spline_class.end_orders
+        for name in ("start", "end"):
+            state = _state(name, getattr(self, name), axes, spline_class.degree, zeros=rest)
+            object.__setattr__(self, name, state)
+        inner = {}
+        for index, state in self.derivatives.items():
+            if not 0 < index < legs:
+                raise InvalidProblem(
+                    f"derivatives are given at waypoint {index}; inner waypoints are 1 to "
+                    f"{legs - 1} (use start and end for the others)"
+                )
+            what = f"waypoint {index}"
+            inner[int(index)] = _state(what, state, axes, spline_class.degree, zeros=0)
+        object.__setattr__(self, "derivatives", inner)
+
+    @cached_property
+    def spline_class(self) -> SplineClass:
+        """Degree, weights and continuity, filled in."""
+        return SplineClass.of(self.minimize, self.degree, self.continuity)
+
+    @property
+    def fixed(self) -> dict[int, np.ndarray]:
+        """Every fixed derivative: waypoint index to (n, 3) from velocity on, NaN where free."""
+        return {0: self.start, **self.derivatives, len(self.waypoints) - 1: self.end}  # type: ignore[dict-item]
+
+    @cached_property
+    def is_scalable(self) -> bool:
+        """Whether slowing down keeps the path: one-derivative cost, no fixed motion but rest."""
+        return self.spline_class.is_homogeneous and not any(
+            np.nan_to_num(state).any() for state in self.fixed.values()
+        )
+
+    @property
+    def leg_lengths(self) -> np.ndarray:
+        """(K,) m, straight distance between the waypoints of each leg."""
+        return np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, lists and names, from which `from_dict` makes the same problem."""
+        minimize = self.minimize
+        if isinstance(minimize, Mapping):
+            minimize = {str(key): float(value) for key, value in minimize.items()}
+        elif not isinstance(minimize, str):
+            minimize = [float(weight) for weight in minimize]
+        inner = {str(index): _numbers(state) for index, state in self.derivatives.items()}
+        return {
+            "waypoints": self.waypoints.tolist(),
+            "limits": self.limits.to_dict(),
+            "minimize": minimize,
+            "degree": self.degree,
+            "continuity": self.continuity,
+            "start": _numbers(self.start),
+            "end": _numbers(self.end),
+            "derivatives": inner,
+            "yaw": None if self.yaw is None else self.yaw.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """A problem from what `to_dict` gave."""
+        values = dict(values)
+        for name in ("waypoints", "limits"):
+            if name not in values:
+                raise InvalidProblem(f"{name} is missing")
+        values["limits"] = Limits.from_dict(values["limits"])
+        inner = values.get("derivatives") or {}
+        values["derivatives"] = {int(index): state for index, state in inner.items()}
+        unknown = set(values) - set(cls.__dataclass_fields__)
+        if unknown:
+            raise InvalidProblem(f"unknown entry {min(unknown)!r} in the problem")
+        return cls(values.pop("waypoints"), **values)
+
+
+def as_float_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> np.ndarray:
+    """A read-only float copy of `values`, checked against `shape` (None: any length)."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidProblem(f"{name} must be numbers in an array, all rows of one length") from None
+    wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+    if array.ndim != len(shape) or any(
+        n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
+    ):
+        raise InvalidProblem(f"{name} has shape {array.shape}; it must be {wanted}")
+    array.setflags(write=False)
+    return array
+
+
+def _waypoints(values: ArrayLike) -> np.ndarray:
+    waypoints = as_float_array("waypoints", values, (None, 3))
+    if len(waypoints) < 2:
+        raise InvalidProblem(
+            f"{len(waypoints)} waypoint{'' if len(waypoints) == 1 else 's'} given; "
+            "a trajectory needs at least two"
+        )
+    finite = np.isfinite(waypoints)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise InvalidProblem(
+            f"waypoint {row} has {AXES[column]} = {waypoints[row, column]}; it must be finite"
+        )
+    same = (waypoints[1:] == waypoints[:-1]).all(axis=1)
+    if same.any():
+        row = int(same.argmax())
+        raise InvalidProblem(
+            f"waypoint {row + 1} repeats waypoint {row} "
+            f"({', '.join(f'{value:g}' for value in waypoints[row])}); merge them first "
+            "(peakflight.tidy does)"
+        )
+    return waypoints
+
+
+def _yaw(values: ArrayLike, count: int) -> np.ndarray:
+    yaw = as_float_array("yaw", values, (count,))
+    if not np.isfinite(yaw).all():
+        row = int((~np.isfinite(yaw)).argmax())
+        raise InvalidProblem(f"waypoint {row} has yaw = {yaw[row]}; it must be finite")
+    return yaw
+
+
+def _state(
+    name: str, state: StateLike | None, axes: int, degree: int, *, zeros: int
+) -> np.ndarray:
+    """Derivatives (n, axes) from velocity on; orders that are not given: `zeros` 0, then free."""
+    if state is None:
+        state = {}
+    if isinstance(state, Mapping):
+        rows = {_order(name, key): value for key, value in state.items()}
+    else:
+        array = as_float_array(name, [[_number(x) for x in row] for row in state], (None, axes))  # type: ignore[union-attr]
+        rows = dict(enumerate(array, start=1))
+    count = max([zeros, *rows])
+    if count >= degree:
+        raise InvalidProblem(
+            f"{name} fixes derivative {count}; degree {degree} allows up to {degree - 1}"
+        )
+    full = np.full((count, axes), math.nan)
+    full[:zeros] = 0.0
+    for order, row in rows.items():
+        full[order - 1] = as_float_array(f"{name} derivative {order}", row, (axes,))
+    if np.isinf(full).any():
+        raise InvalidProblem(f"{name} has an infinite derivative")
+    full.setflags(write=False)
+    return full
+
+
+def _order(name: str, key: str | int) -> int:
+    order = DERIVATIVE_NAMES.index(key) if key in DERIVATIVE_NAMES else key
+    try:
+        order = int(order)
+    except ValueError:
+        order = 0
+    if order < 1:
+        known = ", ".join(DERIVATIVE_NAMES[1:])
+        raise InvalidProblem(f"{name} names derivative {key!r}; known are {known}, or 1, 2, ...")
+    return order
+
+
+def _number(value: Any) -> Any:
+    """JSON has no NaN: null stands for a derivative that is free."""
+    return math.nan if value is None else value
+
+
+def _numbers(state: Any) -> list[list[float | None]]:
+    return [[None if math.isnan(x) else x for x in row] for row in state.tolist()]
+
+
+def _weights(minimize: str | Mapping[str | int, float] | Sequence[float]) -> dict[int, float]:
+    """Positive weights by order of derivative."""
+    if isinstance(minimize, str):
+        minimize = {minimize: 1.0}
+    elif not isinstance(minimize, Mapping):
+        minimize = dict(enumerate(minimize))
+    weights = {}
+    for key, value in minimize.items():
+        order = DERIVATIVE_NAMES.index(key) if key in DERIVATIVE_NAMES else key
+        if isinstance(order, str) and order.isdigit():
+            order = int(order)
+        if not isinstance(order, int | np.integer) or order < 0:
+            known = ", ".join(DERIVATIVE_NAMES[1:5])
+            raise InvalidProblem(f"minimize names {key!r}; known are {known}, or an order")
+        try:
+            weight = float(value)
+        except (TypeError, ValueError):
+            weight = math.nan
+        if not (math.isfinite(weight) and weight >= 0.0):
+            raise InvalidProblem(f"minimize weighs {key!r} by {value!r}; it must be 0 or more")
+        if weight > 0.0:
+            weights[int(order)] = weight
+    if not weights or max(weights) == 0:
+        raise InvalidProblem("minimize weighs no derivative; weigh at least one, such as jerk")
+    return weights
+
+
+def _integer(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InvalidProblem(f"{name} is {value!r}; it must be a whole number")
+    return int(value)
