@@ -1,5 +1,11 @@
-"""The fastest smooth trajectory through waypoints that provably keeps every limit."""
+"""The fastest smooth trajectory through waypoints that provably keeps every limit.
 
+Importing the package is quick: what needs compiled kernels is imported when it is first used.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from peakflight.course import Course, tidy
 from peakflight.errors import (
     InvalidFile,
     InvalidProblem,
@@ -7,16 +13,23 @@ from peakflight.errors import (
     PeakflightError,
     Status,
 )
+from peakflight.formats import read_course
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem
 from peakflight.result import History, Plan, Report
 from peakflight.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from peakflight.certificate import certify, certify_plan, stretch_to_limits
+    from peakflight.planner import plan
+    from peakflight.spline import minimum_effort_spline
 
 __version__ = "0.1.0"
 
 __all__ = [
     "GRAVITY",
     "KINDS",
+    "Course",
     "History",
     "InvalidFile",
     "InvalidProblem",
@@ -29,4 +42,29 @@ __all__ = [
     "Status",
     "Trajectory",
     "__version__",
+    "certify",
+    "certify_plan",
+    "minimum_effort_spline",
+    "plan",
+    "read_course",
+    "stretch_to_limits",
+    "tidy",
 ]
+
+_LAZY = {
+    "certify": "peakflight.certificate",
+    "certify_plan": "peakflight.certificate",
+    "minimum_effort_spline": "peakflight.spline",
+    "plan": "peakflight.planner",
+    "stretch_to_limits": "peakflight.certificate",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_LAZY[name]), name)
+    globals()[name] = value
+    return value

@@ -6,7 +6,7 @@ certificate proves). Everything else, from the report to the command line, goes 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Self
 
@@ -109,6 +109,36 @@ class Limits:
             if name not in known:
                 raise InvalidProblem(f"unknown limit {name!r}; known are {', '.join(known)}")
         return cls(**values)
+
+
+def limited_values(derivatives: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+    """What each kind of limit is about, at samples of a motion.
+
+    Parameters
+    ----------
+    derivatives
+        (..., 3) velocity, acceleration, ... as many as there are; kinds that need more are left
+        out.
+
+    Returns
+    -------
+    Name of kind to (...,), in its unit.
+    """
+    norms = [np.linalg.norm(derivative, axis=-1) for derivative in derivatives]
+    values = dict(zip(("speed", "", "jerk", "snap"), norms, strict=False))
+    values.pop("", None)
+    if len(derivatives) >= 2:
+        thrust = derivatives[1] + np.array([0.0, 0.0, GRAVITY])
+        values["thrust_acceleration"] = np.linalg.norm(thrust, axis=-1)
+        values["least_thrust_acceleration"] = values["thrust_acceleration"]
+        across = np.linalg.norm(thrust[..., :2], axis=-1)
+        values["tilt"] = np.arctan2(across, thrust[..., 2])
+    return values
+
+
+def keeps(name: str, value: float, limit: float) -> bool:
+    """Whether a value of a kind keeps its limit: from below for the least thrust acceleration."""
+    return value >= limit if name.startswith("least_") else value <= limit
 
 
 def _positive(name: str, value: Any) -> float:

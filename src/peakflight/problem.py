@@ -144,7 +144,7 @@ class Problem:
             object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
         rest = spline_class.end_orders
         for name in ("start", "end"):
-            state = _state(name, getattr(self, name), axes, spline_class.degree, zeros=rest)
+            state = fixed_state(name, getattr(self, name), axes, spline_class.degree, zeros=rest)
             object.__setattr__(self, name, state)
         inner = {}
         for index, state in self.derivatives.items():
@@ -154,7 +154,7 @@ class Problem:
                     f"{legs - 1} (use start and end for the others)"
                 )
             what = f"waypoint {index}"
-            inner[int(index)] = _state(what, state, axes, spline_class.degree, zeros=0)
+            inner[int(index)] = fixed_state(what, state, axes, spline_class.degree, zeros=0)
         object.__setattr__(self, "derivatives", inner)
 
     @cached_property
@@ -173,6 +173,17 @@ class Problem:
         return self.spline_class.is_homogeneous and not any(
             np.nan_to_num(state).any() for state in self.fixed.values()
         )
+
+    @property
+    def guaranteed_continuity(self) -> int:
+        """Highest derivative that is sure not to jump at any waypoint.
+
+        A derivative that is fixed at an inner waypoint makes a higher one of a classical spline
+        jump there: what stays continuous is what the end data of two pieces share.
+        """
+        if self.spline_class.is_classical and self.derivatives:
+            return min(self.spline_class.continuity, self.spline_class.end_orders)
+        return self.spline_class.continuity
 
     @property
     def leg_lengths(self) -> np.ndarray:
@@ -219,7 +230,7 @@ def as_float_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) 
     """A read-only float copy of `values`, checked against `shape` (None: any length)."""
     try:
         array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidProblem(f"{name} must be numbers in an array, all rows of one length") from None
     wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
     if array.ndim != len(shape) or any(
@@ -262,10 +273,13 @@ def _yaw(values: ArrayLike, count: int) -> np.ndarray:
     return yaw
 
 
-def _state(
+def fixed_state(
     name: str, state: StateLike | None, axes: int, degree: int, *, zeros: int
 ) -> np.ndarray:
-    """Derivatives (n, axes) from velocity on; orders that are not given: `zeros` 0, then free."""
+    """Fixed derivatives (n, axes) from velocity on, NaN where free.
+
+    Orders that are not given are zero up to `zeros`, and free beyond.
+    """
     if state is None:
         state = {}
     if isinstance(state, Mapping):

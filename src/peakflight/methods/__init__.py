@@ -1,0 +1,57 @@
+"""The methods that answer a problem, one file each, all of one signature.
+
+A method is a function `solve(problem, settings) -> Outcome` in a module of its own, beside the
+frozen type of its settings. A new one is its file and one line in `METHODS`: `plan`, the command
+line and the tests pick it up from there.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Protocol
+
+from peakflight.errors import InvalidProblem, Status
+from peakflight.problem import Problem
+from peakflight.result import History
+from peakflight.trajectory import Trajectory
+
+METHODS = {
+    "proportional": "times proportional to distance, stretched until feasible",
+    "peak": "best segment times for the spline, or the paper's Algorithm 1 (variant paper)",
+}
+"""Name, which is also that of the module, and what it does in a line."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome:
+    """What a method hands back; the planner certifies it."""
+
+    status: Status
+    trajectory: Trajectory
+    """Feasible, unless the status is INFEASIBLE: then the best there was."""
+    iterations: int = 0
+    history: History | None = None
+    message: str = ""
+    """Why there is no solution, or what stopped the method early."""
+
+
+class Method(Protocol):
+    """A module of this folder that answers problems."""
+
+    Settings: type
+    """Frozen, every field with a default."""
+
+    def solve(self, problem: Problem, settings: Any) -> Outcome:
+        """Answer a problem."""
+
+
+def find(name: str) -> Method:
+    """The module of a method.
+
+    Raises
+    ------
+    InvalidProblem
+        If there is no such method.
+    """
+    if name not in METHODS:
+        raise InvalidProblem(f"unknown method {name!r}; known are {', '.join(METHODS)}")
+    return import_module(f"peakflight.methods.{name}")  # type: ignore[return-value]

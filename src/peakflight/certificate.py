@@ -1,0 +1,173 @@
+"""What is proven about a trajectory: peak ratios, joints, waypoints, and the exact stretch.
+
+Nothing here is shared with the optimisers: bounds are taken of the coefficients that are written to
+the file (`kernels.bounds`).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from peakflight.errors import InvalidProblem
+from peakflight.kernels import bounds, joints
+from peakflight.kernels.jit import fresh
+from peakflight.limits import GRAVITY, KINDS, Limits
+from peakflight.problem import DERIVATIVE_NAMES, Problem, as_float_array
+from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
+from peakflight.trajectory import Trajectory
+
+TOLERANCE = 1e-10
+"""Relative distance between the certified bound of a squared norm and an attained value."""
+
+
+def certify(
+    trajectory: Trajectory,
+    limits: Limits,
+    *,
+    waypoints: ArrayLike | None = None,
+    pieces: Sequence[int] | None = None,
+    continuity: int | None = None,
+) -> Report:
+    """Prove what can be proven about a trajectory (Eq. kapp_i, Eq. kappa2).
+
+    Parameters
+    ----------
+    trajectory
+        In three axes, z up.
+    limits
+        What it should keep.
+    waypoints
+        (legs+1, 3) m that it should pass, the first and last at its ends; by default not checked.
+    pieces
+        (legs,) number of pieces in each leg; one each by default.
+    continuity
+        Highest derivative that should not jump; by default 2, so that attitude does not.
+
+    Raises
+    ------
+    InvalidProblem
+        If the shapes do not fit.
+    """
+    _check_axes(trajectory)
+    coefficients = fresh(trajectory.coefficients)
+    times = fresh(trajectory.segment_times)
+    upper, _, _ = _bound(coefficients, times, limits)
+    if waypoints is None:
+        points, firsts = coefficients[:1, 0], np.zeros(0, dtype=np.int64)
+    else:
+        legs = len(times) if pieces is None else len(pieces)
+        counts = np.ones(legs, dtype=np.int64) if pieces is None else np.array(pieces)
+        if counts.sum() != len(times):
+            raise InvalidProblem(f"pieces add up to {counts.sum()}; there are {len(times)}")
+        points = fresh(as_float_array("waypoints", waypoints, (legs + 1, 3)))
+        firsts = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
+    smooth = 2 if continuity is None else continuity
+    jump, joint, order, miss, waypoint = joints.residuals(
+        coefficients, times, smooth, bounds.falling_factorials(trajectory.degree), points, firsts
+    )
+    peaks = {
+        kind.name: upper[:, index]
+        for index, kind in enumerate(KINDS)
+        if getattr(limits, kind.name) is not None
+    }
+    problems = _exceeded(peaks, limits)
+    if not jump <= JOINT_TOLERANCE:
+        problems.append(
+            f"{DERIVATIVE_NAMES[order] if order < len(DERIVATIVE_NAMES) else f'derivative {order}'}"
+            f" jumps at the end of segment {joint}, by {jump:.1e} of its size there"
+        )
+    if waypoints is not None:
+        tolerance = WAYPOINT_TOLERANCE * (1.0 + float(np.abs(points).max()))
+        if not miss <= tolerance:
+            problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
+    return Report(
+        feasible=not problems,
+        peaks=peaks,
+        joint_residual=float(jump),
+        waypoint_error=float(miss) if waypoints is not None else 0.0,
+        problems=tuple(problems),
+    )
+
+
+def certify_plan(plan: Plan) -> Report:
+    """Prove a plan again, from its trajectory, limits and waypoints alone."""
+    return certify_answer(plan.problem, plan.trajectory, plan.pieces)
+
+
+def certify_answer(
+    problem: Problem, trajectory: Trajectory, pieces: Sequence[int] | None = None
+) -> Report:
+    """Prove that a trajectory answers a problem."""
+    return certify(
+        trajectory,
+        problem.limits,
+        waypoints=problem.waypoints,
+        pieces=pieces,
+        continuity=problem.guaranteed_continuity,
+    )
+
+
+def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajectory, float] | None:
+    """The same path, flown as fast as the limits allow: the exact uniform stretch.
+
+    Scaling all times by alpha divides derivative s by alpha^s. The smallest alpha that keeps every
+    limit costs no new spline; it is found by certified peaks and closed to 1e-9.
+
+    Returns
+    -------
+    The certified trajectory and alpha, or None if no alpha keeps the limits.
+    """
+    _check_axes(trajectory)
+    coefficients = fresh(trajectory.coefficients)
+    times = fresh(trajectory.segment_times)
+    shape = (len(times), len(KINDS))
+    factor = bounds.stretch(
+        coefficients, times, limits.as_array(), GRAVITY, _tables(trajectory.degree), TOLERANCE,
+        np.empty(shape), np.empty(shape), np.empty(shape),
+    )  # fmt: skip
+    if not np.isfinite(factor):
+        return None
+    return Trajectory(coefficients, times, trajectory.start_time), float(factor)
+
+
+def peak_ratios(trajectory: Trajectory, limits: Limits) -> np.ndarray:
+    """(K, len(KINDS)) certified kappa (Eq. kapp_i, Eq. kappa2); NaN for limits that are not set."""
+    _check_axes(trajectory)
+    upper, _, _ = _bound(fresh(trajectory.coefficients), fresh(trajectory.segment_times), limits)
+    return upper
+
+
+def _bound(
+    coefficients: np.ndarray, times: np.ndarray, limits: Limits
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    shape = (len(times), len(KINDS))
+    upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
+    bounds.certify(
+        coefficients, times, limits.as_array(), GRAVITY, _tables(coefficients.shape[1] - 1),
+        TOLERANCE, upper, lower, place,
+    )  # fmt: skip
+    return upper, lower, place
+
+
+def _tables(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return (*bounds.bernstein_tables(degree), bounds.falling_factorials(degree))
+
+
+def _check_axes(trajectory: Trajectory) -> None:
+    if trajectory.axes != 3:
+        raise InvalidProblem(f"the trajectory has {trajectory.axes} axes; limits are about three")
+
+
+def _exceeded(peaks: dict[str, np.ndarray], limits: Limits) -> list[str]:
+    """One line for each limit that is not kept."""
+    lines = []
+    for kind in limits.active:
+        kappa = peaks[kind.name]
+        segment = int(np.argmax(np.where(np.isnan(kappa), np.inf, kappa)))
+        if not kappa[segment] <= 1.0:
+            lines.append(
+                f"{kind.label} reaches {kappa[segment]:.6g} times its limit of "
+                f"{getattr(limits, kind.name):g} {kind.unit} in segment {segment}"
+            )
+    return lines

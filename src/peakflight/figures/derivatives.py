@@ -1,0 +1,216 @@
+"""What is limited, against time, with the limits."""
+
+import textwrap
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from peakflight.figures.canvas import (
+    FAINT,
+    INK,
+    LIMIT,
+    POINTS,
+    SOFT,
+    TEXT,
+    WIDTH,
+    add_axes,
+    even_step,
+    new_figure,
+    plain_unit,
+    text_width,
+    write_headline,
+    write_note,
+)
+from peakflight.limits import GRAVITY, KINDS, LimitKind
+from peakflight.result import BINDING, Plan
+from peakflight.trajectory import Trajectory
+
+ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
+"""Shown whether they are limited or not."""
+SAMPLES = 3000
+"""About how many points a curve has."""
+PIECE_SAMPLES = (9, 200)
+"""Fewest and most points to a polynomial piece."""
+PANEL = 1.05
+"""Height of a panel, in."""
+GAP = 0.13
+"""Between panels, in."""
+LEFT, RIGHT, BOTTOM, TOP = 0.92, 0.85, 0.45, 0.55
+"""Margins, in."""
+HEADROOM = 1.15
+"""Height of a panel's axis, relative to what it shows."""
+KEY = "○ limit binds   × limit exceeded"  # noqa: RUF001
+FAR = 4.0
+"""A limit that is further above the curve than this is named, but not drawn to scale."""
+MOST_BORDERS = 60
+"""With more legs, only the borders of every second, fifth, ... are drawn."""
+MOST_NUMBERS = 40
+"""With more legs, only every second, fifth, ... is numbered."""
+
+
+def derivatives_figure(plan: Plan) -> Figure:
+    """Draw speed, thrust acceleration, jerk, snap and what else is limited against time.
+
+    Legs are numbered from 0 on top. A ring marks the peak of each segment that a limit binds
+    (kappa within 0.1 % of 1), a cross one that exceeds it.
+    """
+    trajectory, limits = plan.trajectory, plan.problem.limits
+    count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
+    curves = limited_values(trajectory, count)
+    local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
+    times = trajectory.breakpoints[:-1, None] + local
+    shown = [
+        kind
+        for kind in KINDS
+        if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
+    ]
+    figure = new_figure(BOTTOM + TOP + len(shown) * PANEL + (len(shown) - 1) * GAP)
+    write_headline(figure, plan, 0.12)
+    write_note(figure, KEY, WIDTH - 0.12)
+    panels = []
+    for row, kind in enumerate(reversed(shown)):
+        bottom = BOTTOM + row * (PANEL + GAP)
+        axes = add_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
+        axes.tick_params(labelbottom=row == 0)
+        kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
+        limit = getattr(limits, kind.name)
+        _draw_panel(axes, kind, limit, times=times, values=curves[kind.name], kappa=kappa)
+        _draw_borders(axes, plan.waypoint_times)
+        panels.append(axes)
+    panels[0].set_xlabel("time (s)", fontsize=TEXT, color=INK)
+    _number_legs(panels[-1], plan.waypoint_times)
+    return figure
+
+
+def limited_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
+    """Name of limit to (K, count): what it limits, at even points of each piece.
+
+    In the unit of the limit, but tilt in degrees.
+    """
+    velocity, acceleration, jerk, snap = (trajectory.sample(count, order) for order in (1, 2, 3, 4))
+    thrust = acceleration + np.array([0.0, 0.0, GRAVITY])
+    size = np.linalg.norm(thrust, axis=-1)
+    across = np.hypot(thrust[..., 0], thrust[..., 1])
+    return {
+        "speed": np.linalg.norm(velocity, axis=-1),
+        "thrust_acceleration": size,
+        "jerk": np.linalg.norm(jerk, axis=-1),
+        "snap": np.linalg.norm(snap, axis=-1),
+        "tilt": np.degrees(np.arctan2(across, thrust[..., 2])),
+        "least_thrust_acceleration": size,
+    }
+
+
+def _draw_panel(
+    axes: Axes,
+    kind: LimitKind,
+    limit: float | None,
+    *,
+    times: np.ndarray,
+    values: np.ndarray,
+    kappa: np.ndarray,
+) -> None:
+    """One curve (K, n) with its limit and the segments whose kappa (K,) reaches it."""
+    unit = plain_unit(kind.unit)
+    if kind.unit == "rad":
+        unit, limit = "°", None if limit is None else float(np.degrees(limit))
+    axes.plot(times.ravel(), values.ravel(), color=INK, linewidth=1.0, zorder=3)
+    top = max(float(values.max()), 1e-12)
+    if limit is not None:
+        axes.axhline(limit, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
+        far = limit > FAR * top
+        top = top if far else max(top, limit)
+        place = (1.012, HEADROOM * top if far else limit)
+        space = "" if unit == "°" else " "
+        axes.text(
+            *place,
+            f"{limit:.6g}{space}{unit}" + (" ↑" if far else ""),
+            transform=axes.get_yaxis_transform(),
+            ha="left",
+            va="center",
+            fontsize=TEXT,
+            color=LIMIT,
+        )
+        _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
+    axes.set(xlim=(times[0, 0], times[-1, -1]), ylim=(0.0, HEADROOM * top))
+    axes.locator_params(axis="y", nbins=4)
+    label = textwrap.fill(kind.label, 14) + f"\n({unit})"
+    axes.set_ylabel(label, fontsize=TEXT, color=INK)
+    axes.yaxis.set_label_coords(-0.08, 0.5)
+
+
+def _mark_peaks(
+    axes: Axes, times: np.ndarray, values: np.ndarray, kappa: np.ndarray, *, least: bool
+) -> None:
+    rows = np.arange(len(values))
+    columns = values.argmin(axis=1) if least else values.argmax(axis=1)
+    above = kappa > 1.0
+    for chosen, marker, colour in (
+        ((kappa >= BINDING) & ~above, "o", "white"),
+        (above, "x", LIMIT),
+    ):
+        at = rows[chosen], columns[chosen]
+        axes.plot(
+            times[at],
+            values[at],
+            linestyle="none",
+            marker=marker,
+            markersize=3.6,
+            markerfacecolor=colour,
+            markeredgecolor=LIMIT,
+            markeredgewidth=0.9,
+            zorder=4,
+            clip_on=False,
+        )
+
+
+def _draw_borders(axes: Axes, borders: np.ndarray) -> None:
+    inner = borders[1:-1]
+    inner = inner[:: even_step(len(inner), MOST_BORDERS)]
+    lines = [[(time, 0.0), (time, 1.0)] for time in inner]
+    axes.add_collection(
+        LineCollection(
+            lines,
+            colors=FAINT,
+            linewidths=0.6,
+            transform=axes.get_xaxis_transform(),
+            zorder=1,
+        ),
+        autolim=False,
+    )
+
+
+def _number_legs(axes: Axes, borders: np.ndarray) -> None:
+    """Write the number of each leg above its middle, as far as there is room."""
+    legs = len(borders) - 1
+    points = POINTS * (WIDTH - LEFT - RIGHT) / (borders[-1] - borders[0])
+    free = -np.inf
+    transform = axes.get_xaxis_transform()
+    for leg in range(0, legs, even_step(legs, MOST_NUMBERS)):
+        text = str(leg)
+        middle, half = 0.5 * (borders[leg] + borders[leg + 1]), 0.5 * text_width(text) / points
+        if middle - half < free:
+            continue
+        axes.text(
+            middle,
+            1.03,
+            text,
+            transform=transform,
+            ha="center",
+            va="bottom",
+            fontsize=TEXT,
+            color=SOFT,
+        )
+        free = middle + half + 2.0 / points
+    axes.text(
+        -0.012,
+        1.03,
+        "leg",
+        transform=axes.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=TEXT,
+        color=SOFT,
+    )

@@ -1,0 +1,53 @@
+"""All figures of a plan as files."""
+
+from io import BytesIO
+from pathlib import Path
+
+from peakflight.errors import InvalidFile
+from peakflight.figures.course import course_figure
+from peakflight.figures.derivatives import derivatives_figure
+from peakflight.figures.segment_times import segment_times_figure
+from peakflight.files import PathLike, prepare_folder, write_atomically
+from peakflight.result import Plan
+
+FORMATS = ("png", "pdf", "svg")
+"""Kinds of picture file that can be written."""
+FIGURES = {
+    "course": course_figure,
+    "derivatives": derivatives_figure,
+    "segment_times": segment_times_figure,
+}
+"""Name of file to what draws it."""
+
+
+def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[Path]:
+    """Draw every figure of a plan into a folder, which is created if need be.
+
+    Parameters
+    ----------
+    plan
+        What to draw, feasible or not.
+    folder
+        Gets `course`, `derivatives` and `segment_times`; nothing is left half written.
+    format
+        "png", "pdf" or "svg".
+
+    Returns
+    -------
+    The files, in that order.
+
+    Raises
+    ------
+    InvalidFile
+        If the format is unknown or the folder cannot be written to.
+    """
+    if format not in FORMATS:
+        raise InvalidFile(f"{folder}: format {format!r} is unknown; known are {', '.join(FORMATS)}")
+    target = prepare_folder(folder)
+    paths = []
+    for name, draw in FIGURES.items():
+        stream = BytesIO()
+        draw(plan).savefig(stream, format=format)
+        paths.append(target / f"{name}.{format}")
+        write_atomically(paths[-1], stream.getvalue())
+    return paths

@@ -1,0 +1,394 @@
+"""Certified upper bounds of what limits are about, over whole pieces.
+
+Everything here is separate from the optimisers and reads only coefficients and durations. A
+derivative of a piece, in the Bernstein basis, lies in the hull of its control points; so does its
+squared norm, and a quotient of polynomials lies below the largest quotient of their control points
+where the denominator's are positive. Subdivision (de Casteljau, at the maximum found by Newton
+steps) closes the gap between that bound and an attained value to a relative tolerance. Rounding is
+bounded beforehand and added to the control points, so that the bound holds for the polynomial that
+is written in the file, in exact arithmetic.
+
+A new kind of limit is one branch in `_quotient` and one in `_ratio`. Kinds are numbered as in
+`limits.KINDS`.
+"""
+
+from functools import lru_cache
+from math import comb, perm
+
+import numpy as np
+
+from peakflight.kernels.jit import inner, kernel
+
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
+"""The derivative that each kind is about."""
+EPSILON = 2.220446049250313e-16
+DEPTH = 24
+"""Intervals that wait at any one time; beyond, the hull of an interval is taken as it is."""
+SPLITS = 400
+"""Subdivisions of one polynomial, likewise."""
+NEWTON = 5
+"""Steps towards the maximum before an interval is split there."""
+UNBOUNDED = 1e9
+"""Kappa where no bound exists, as for least thrust in free fall."""
+EXCESS = 1e-9
+"""A stretched trajectory may keep this much less than its limits allow, relative."""
+ROUNDS = 40
+"""Most rounds of the search for a uniform stretch; two or three are usual."""
+
+
+@lru_cache
+def bernstein_tables(degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Conversions for degrees up to `degree`.
+
+    Returns
+    -------
+    (N+1, N+1, N+1) for each degree n, control point i from coefficient j of u^j; and
+    (N+1, N+1, N+1) for each n, the weight of control points i, j in number i+j of a product.
+    """
+    size = degree + 1
+    convert = np.zeros((size, size, size))
+    product = np.zeros((size, size, size))
+    for n in range(size):
+        for i in range(n + 1):
+            for j in range(n + 1):
+                product[n, i, j] = comb(n, i) * comb(n, j) / comb(2 * n, i + j)
+                if j <= i:
+                    convert[n, i, j] = comb(i, j) / comb(n, j)
+    return convert, product
+
+
+@lru_cache
+def falling_factorials(degree: int) -> np.ndarray:
+    """(max(N, 4) + 1, N+1): factor of coefficient j in derivative s, j! / (j-s)!."""
+    orders = range(max(degree, 4) + 1)
+    return np.array([[float(perm(j, s)) for j in range(degree + 1)] for s in orders])
+
+
+@kernel
+def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place):
+    """Certified kappa of every piece and kind.
+
+    coefficients (K, N+1, 3), times (K,), limits as `Limits.as_array`; tables: of
+    `bernstein_tables` and `falling_factorials`; upper and lower (K, kinds) get the bound and a
+    value that is attained (NaN for kinds that are not limited), place (K, kinds) where, in
+    normalised time.
+    """
+    degree = coefficients.shape[1] - 1
+    points = np.empty((degree + 1, 3))
+    numerators = np.empty((DEPTH + 3, 2 * degree + 1))
+    denominators = np.empty((DEPTH + 3, 2 * degree + 1))
+    ends = np.empty((DEPTH + 3, 2))
+    for k in range(times.size):
+        for kind in range(limits.size):
+            upper[k, kind] = np.nan
+            lower[k, kind] = np.nan
+            place[k, kind] = 0.0
+            if not limits[kind] > 0.0:
+                continue
+            size, plain, defined = _quotient(
+                kind, coefficients, k, times[k], gravity, tables, points, numerators, denominators,
+                ends,
+            )  # fmt: skip
+            high = np.inf
+            low = np.inf
+            if defined:
+                low, high, place[k, kind] = _largest(
+                    numerators, denominators, plain, size, tolerance, ends
+                )
+            upper[k, kind] = _ratio(kind, high, limits[kind], True)
+            lower[k, kind] = _ratio(kind, low, limits[kind], False)
+
+
+@kernel
+def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place):
+    """Scale a trajectory by the smallest uniform stretch that keeps every limit, certified.
+
+    As `certify`; coefficients and times are replaced. Returns the stretch, or NaN if there is
+    none. The path stays: derivative s is divided by the stretch to the power s.
+    """
+    original = coefficients.copy()
+    durations = times.copy()
+    factor = 1.0
+    best = np.inf
+    for _ in range(ROUNDS):
+        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place)
+        feasible = True
+        needed = 0.0
+        for k in range(times.size):
+            for kind in range(limits.size):
+                if limits[kind] > 0.0:
+                    if not upper[k, kind] <= 1.0:
+                        feasible = False
+                    needed = max(
+                        needed,
+                        _needed(kind, coefficients, k, times[k], place[k, kind], limits, gravity,
+                                tables[2]),
+                    )  # fmt: skip
+        if feasible:
+            best = min(best, factor)
+            if needed >= 1.0 - EXCESS:
+                break
+        if not (0.0 < needed < np.inf):
+            break
+        if feasible and best < np.inf and factor > best:
+            break  # going faster broke a limit elsewhere, and coming back ended higher: enough
+        # a violation that only the bound sees is closed by the tolerance itself
+        needed = max(needed, 1.0 + 2.0 * tolerance) if not feasible else needed
+        factor *= needed * (1.0 + 4.0 * EPSILON)
+        _rescale(original, durations, factor, coefficients, times)
+    if best == np.inf:
+        return np.nan
+    if best != factor:
+        _rescale(original, durations, best, coefficients, times)
+        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place)
+    return best
+
+
+@inner
+def _rescale(coefficients, times, factor, scaled_coefficients, scaled_times):
+    for k in range(times.size):
+        scaled_times[k] = times[k] * factor
+        power = 1.0
+        for j in range(coefficients.shape[1]):
+            for d in range(coefficients.shape[2]):
+                scaled_coefficients[k, j, d] = coefficients[k, j, d] / power
+            power *= factor
+
+
+@inner
+def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials):
+    """Uniform stretch that one kind asks for at one point of a piece."""
+    order = KIND_ORDERS[kind]
+    x = 0.0
+    y = 0.0
+    z = 0.0
+    for j in range(coefficients.shape[1] - 1, order - 1, -1):
+        x = x * (place * time) + factorials[order, j] * coefficients[piece, j, 0]
+        y = y * (place * time) + factorials[order, j] * coefficients[piece, j, 1]
+        z = z * (place * time) + factorials[order, j] * coefficients[piece, j, 2]
+    return _required_stretch(kind, x, y, z, limits[kind], gravity)
+
+
+@inner
+def _required_stretch(kind, x, y, z, limit, gravity):
+    """Smallest uniform stretch, at least 0, after which a derivative keeps the limit, exactly."""
+    square = x * x + y * y + z * z
+    if kind == 1:  # |a|^2 + 2 g a_z alpha^2 + g^2 alpha^4 = L^2 alpha^4
+        room = limit * limit - gravity * gravity
+        b = gravity * z
+        return np.sqrt((b + np.sqrt(b * b + room * square)) / room)
+    if kind == 4:  # |a_xy| cot(limit) - a_z = g alpha^2
+        return np.sqrt(max(np.sqrt(x * x + y * y) / np.tan(limit) - z, 0.0) / gravity)
+    if kind == 5:  # the larger root of |a|^2 + 2 g a_z alpha^2 + (g^2 - L^2) alpha^4 = 0
+        room = gravity * gravity - limit * limit
+        b = -gravity * z
+        discriminant = b * b - room * square
+        if b <= 0.0 or discriminant <= 0.0:
+            return 0.0
+        return np.sqrt((b + np.sqrt(discriminant)) / room)
+    return (np.sqrt(square) / limit) ** (1.0 / KIND_ORDERS[kind])
+
+
+@inner
+def _quotient(
+    kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
+):
+    """Control points of the quotient whose maximum a kind bounds, in row 0 of the stacks.
+
+    Returns their degree, whether the denominator is one, and whether the quotient is defined.
+    """
+    order = KIND_ORDERS[kind]
+    gravity = gravity if order == 2 else 0.0
+    degree, error = _control_points(
+        coefficients, piece, time, order, gravity, tables[0], tables[2], points
+    )
+    if kind == 4:  # |a_xy|^2 / (a_z + g)^2, the squared tangent of the tilt
+        for i in range(degree + 1):
+            numerators[0, i] = error - points[i, 2]
+        _, high, _ = _largest(numerators, denominators, True, degree, 1e-3, ends)
+        if not high < 0.0:
+            return 2 * degree, False, False
+        _square(points, 0, 2, degree, error, tables[1], 1.0, numerators)
+        _square(points, 2, 3, degree, error, tables[1], -1.0, denominators)
+        return 2 * degree, False, True
+    if kind == 5:  # 1 / |a + g e3|^2
+        _square(points, 0, 3, degree, error, tables[1], -1.0, denominators)
+        for i in range(2 * degree + 1):
+            numerators[0, i] = 1.0
+        return 2 * degree, False, True
+    _square(points, 0, 3, degree, error, tables[1], 1.0, numerators)
+    return 2 * degree, True, True
+
+
+@inner
+def _ratio(kind, value, limit, is_bound):
+    """Kappa from the value that `_quotient` is about; a bound is rounded up."""
+    slack = 1.0 + 4.0 * EPSILON if is_bound else 1.0
+    root = np.sqrt(max(value, 0.0)) * slack
+    if kind == 4:
+        ratio = np.arctan(root) * slack / limit if value < np.inf else np.pi / limit
+    elif kind == 5:
+        ratio = root * limit
+    else:
+        ratio = root / limit
+    return min(ratio * slack, UNBOUNDED) if ratio == ratio else UNBOUNDED
+
+
+@inner
+def _control_points(coefficients, piece, time, order, gravity, convert, factorials, points):
+    """points (n+1, 3) <- Bernstein control points of a derivative, with g added to the third axis.
+
+    Returns their degree and a bound of the rounding error of each entry's norm.
+    """
+    degree = coefficients.shape[1] - 1 - order
+    if degree < 0:
+        degree = 0
+        points[0, 0] = 0.0
+        points[0, 1] = 0.0
+        points[0, 2] = gravity
+        return degree, 0.0
+    worst = 0.0
+    for i in range(degree + 1):
+        total = 0.0
+        for d in range(3):
+            value = gravity if d == 2 else 0.0
+            size = abs(value)
+            power = 1.0
+            for j in range(i + 1):
+                term = (
+                    convert[degree, i, j] * factorials[order, j + order]
+                    * coefficients[piece, j + order, d] * power
+                )  # fmt: skip
+                value += term
+                size += abs(term)
+                power *= time
+            points[i, d] = value
+            total += size * size
+        worst = max(worst, total)
+    return degree, (2 * degree + 8) * EPSILON * np.sqrt(worst)
+
+
+@inner
+def _square(points, first, last, degree, error, product, sign, out):
+    """out[0] <- control points of the squared norm of some axes, moved by sign times a bound of
+    all rounding errors, those of subdivision included."""
+    largest = 0.0
+    for i in range(2 * degree + 1):
+        out[0, i] = 0.0
+    for i in range(degree + 1):
+        norm = 0.0
+        for d in range(first, last):
+            norm += points[i, d] * points[i, d]
+        largest = max(largest, norm)
+        for j in range(degree + 1):
+            dot = 0.0
+            for d in range(first, last):
+                dot += points[i, d] * points[j, d]
+            out[0, i + j] += product[degree, i, j] * dot
+    rounding = (10 + 2 * degree + 8 * degree * DEPTH) * EPSILON
+    margin = 2.0 * error * np.sqrt(largest) + error * error + rounding * largest
+    for i in range(2 * degree + 1):
+        out[0, i] += sign * margin
+
+
+@inner
+def _largest(numerators, denominators, plain, degree, tolerance, ends):
+    """Bounds of the largest quotient over [0, 1] from the control points in row 0.
+
+    plain: the denominator is one. Returns an attained value, an upper bound, and where the first
+    is attained.
+    """
+    low = -np.inf
+    high = -np.inf
+    place = 0.0
+    for side in range(2):
+        value = _at_end(numerators, denominators, plain, 0, side * degree)
+        if value > low:
+            low = value
+            place = float(side)
+    waiting = 1
+    splits = 0
+    ends[0, 0] = 0.0
+    ends[0, 1] = 1.0
+    while waiting > 0:
+        waiting -= 1
+        bound = -np.inf
+        index = 0
+        for i in range(degree + 1):
+            value = _at_end(numerators, denominators, plain, waiting, i)
+            if not value <= bound:
+                bound = value
+                index = i
+        if bound <= low + tolerance * abs(low):
+            high = max(high, bound)
+            continue
+        if waiting >= DEPTH or splits > SPLITS or bound != bound:
+            high = bound if not bound <= high else high  # NaN stays
+            continue
+        at = 0.5
+        if splits < 8 and 0 < index < degree:
+            at = index / degree
+            if plain and degree >= 2:
+                at = _newton(numerators, waiting, waiting + 2, degree, at)
+        middle = ends[waiting, 0] + at * (ends[waiting, 1] - ends[waiting, 0])
+        _split(numerators, waiting, degree, at)
+        if not plain:
+            _split(denominators, waiting, degree, at)
+        ends[waiting + 1, 0] = ends[waiting, 0]
+        ends[waiting + 1, 1] = middle
+        ends[waiting, 0] = middle
+        value = _at_end(numerators, denominators, plain, waiting, 0)
+        if value > low and value < np.inf:
+            low = value
+            place = middle
+        splits += 1
+        waiting += 2
+    return low, max(low, high), place
+
+
+@inner
+def _at_end(numerators, denominators, plain, row, i):
+    """Quotient of two control points; infinite where the denominator may vanish."""
+    if plain:
+        return numerators[row, i]
+    if denominators[row, i] > 0.0:
+        return numerators[row, i] / denominators[row, i]
+    return np.inf
+
+
+@inner
+def _newton(points, row, scratch, degree, at):
+    """Where the polynomial of a row has its maximum, near `at`; 0.5 if that leads nowhere."""
+    for _ in range(NEWTON):
+        rest = 1.0 - at
+        for i in range(degree + 1):
+            points[scratch, i] = points[row, i]
+        for level in range(degree - 2):
+            for i in range(degree - level):
+                points[scratch, i] = rest * points[scratch, i] + at * points[scratch, i + 1]
+        curve = (
+            (degree - 1) * degree
+            * (points[scratch, 2] - 2.0 * points[scratch, 1] + points[scratch, 0])
+        )  # fmt: skip
+        first = rest * points[scratch, 0] + at * points[scratch, 1]
+        second = rest * points[scratch, 1] + at * points[scratch, 2]
+        if not curve < 0.0:
+            break
+        step = -degree * (second - first) / curve
+        at += step
+        if not 1e-6 < at < 1.0 - 1e-6:
+            return 0.5
+        if abs(step) < 1e-8:
+            break
+    return at if 1e-6 < at < 1.0 - 1e-6 else 0.5
+
+
+@inner
+def _split(points, row, degree, at):
+    """De Casteljau: row + 1 <- the part before `at`, row <- the part after."""
+    rest = 1.0 - at
+    points[row + 1, 0] = points[row, 0]
+    for level in range(degree):
+        for i in range(degree - level):
+            points[row, i] = rest * points[row, i] + at * points[row, i + 1]
+        points[row + 1, level + 1] = points[row, 0]

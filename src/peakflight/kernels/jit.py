@@ -1,0 +1,86 @@
+"""How kernels are compiled, and where the result is kept."""
+
+import hashlib
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def _cache_folder() -> str:
+    """A folder that can be written to, named after the source of all kernels.
+
+    Numba looks only at the file of the function that Python calls to see whether what it has kept
+    is still right, and refuses to compile at all where it finds no folder to write to.
+    """
+    here = Path(__file__).parent
+    digest = hashlib.sha256(b"".join(f.read_bytes() for f in sorted(here.glob("*.py"))))
+    name = f"peakflight-{digest.hexdigest()[:12]}"
+    if numba.config.CACHE_DIR:
+        return str(Path(numba.config.CACHE_DIR) / name)
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for folder in (here / "__pycache__", home):
+        try:
+            (folder / name).mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder / name, os.W_OK):
+            return str(folder / name)
+    return tempfile.mkdtemp(prefix=f"{name}-")
+
+
+FOLDER = _cache_folder()
+"""Where compiled kernels are kept."""
+
+
+def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    def decorate(function: Callable[..., Any]) -> Any:
+        others = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = FOLDER
+        try:
+            return numba.njit(cache=True, error_model="numpy", **options)(function)
+        finally:
+            numba.config.CACHE_DIR = others
+
+    return decorate
+
+
+_INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+kernel = _compiled()
+"""Decorator of every kernel that Python calls."""
+inner = _compiled(**_INNER)
+"""Decorator of kernels that only kernels call: no entry point from Python, less to compile."""
+vector = _compiled(**_INNER, fastmath={"reassoc", "contract", "nsz"})
+"""As `inner`, for loops over samples: sums may be taken in any order. NaN and infinity stay."""
+
+
+_ready: set[str] = set()
+
+
+@contextmanager
+def announced(name: str, log: logging.Logger) -> Iterator[None]:
+    """Around the use of kernels: says so when they must be compiled first, once on a machine.
+
+    `name` tells one set of kernels from others; a mark beside the cache remembers it.
+    """
+    mark = Path(FOLDER) / f"{name}.ready"
+    known = name in _ready or mark.exists() or numba.config.DISABLE_JIT
+    if not known:
+        log.warning("compiling the planner for this machine, once; this takes some seconds")
+    yield
+    if not known:
+        mark.touch()
+    _ready.add(name)
+
+
+def fresh(array: ArrayLike) -> np.ndarray:
+    """A writable, C-contiguous float64 copy: the one kind of array that kernels are compiled for."""
+    return np.array(array, dtype=np.float64, order="C", copy=True)

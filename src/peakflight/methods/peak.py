@@ -1,0 +1,99 @@
+"""The best segment times for the spline (Eq. opt_time), or the paper's Algorithm 1.
+
+Both alternate between the spline for given times (sub-problem 1) and better times for its peaks
+(sub-problem 2). The default does so by descent: it minimises the total time plus a barrier of the
+peaks (`kernels.barrier`) over the logarithms of the segment times, with the gradient through
+sub-problem 1 by its adjoint. Powers rise from stage to stage, from a rough shape that any start
+leads to up to limits that are hard in all but name; the exact stretch does the rest.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from peakflight.certificate import peak_ratios
+from peakflight.errors import InvalidProblem, Status
+from peakflight.kernels import basis, barrier, descent
+from peakflight.limits import GRAVITY
+from peakflight.methods import Outcome, algorithm1
+from peakflight.methods.algorithm1 import Algorithm1Settings
+from peakflight.methods.scaling import estimated_stretch, finish, proportional_times
+from peakflight.problem import Problem
+from peakflight.result import History
+from peakflight.spline import SplineTask
+
+Stage = tuple[int, int, float]
+
+LADDER: tuple[Stage, ...] = (
+    (8, 6, 1e-2),
+    (8, 24, 1e-2),
+    (8, 96, 1e-3),
+    (16, 384, 1e-4),
+    (32, 1536, 5e-5),
+    (64, 6144, 3e-6),
+)
+"""Starting at the power 6 is what makes the plain start safe; ending at 6144 leaves 1e-4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Tuning of `peak`."""
+
+    variant: Literal["descent", "paper"] = "descent"
+    """descent: the best segment times; paper: Algorithm 1 to the letter."""
+    ladder: tuple[Stage, ...] = LADDER
+    """Stages: samples a piece (8, 16, 32 or 64), power (24 times a power of two, from 6 on), and
+    the relative decrease over five iterations that ends the stage."""
+    stage_iterations: int = 300
+    """Most iterations in a stage."""
+    memory: int = 10
+    """Pairs that L-BFGS keeps."""
+    history_size: int = 1_000_000
+    """Most segment times kept for the history, of all iterations together."""
+    paper: Algorithm1Settings = Algorithm1Settings()
+    """Learning rates and the rest of variant paper."""
+
+
+def solve(problem: Problem, settings: Settings) -> Outcome:
+    """Best segment times for the spline of the problem, feasible."""
+    if settings.variant == "paper":
+        return algorithm1.solve(problem, settings.paper)
+    if settings.variant != "descent":
+        raise InvalidProblem(f"unknown variant {settings.variant!r}; known are descent and paper")
+    task = SplineTask.of(problem.waypoints, problem.spline_class, problem.fixed)
+    times = proportional_times(problem)
+    times *= estimated_stretch(peak_ratios(task.solve(times), problem.limits))
+    start = times.copy()
+    count = len(times)
+    history = np.empty((max(settings.history_size // count, 1), count))
+    iterations, _, converged = descent.descend(
+        task.rows, (task.waypoints, task.simple, task.layered), times,
+        problem.limits.as_array(), GRAVITY,
+        tuple(basis.sample_tables(task.spline_class.degree, s) for s, _, _ in settings.ladder),
+        _stages(settings), settings.memory, barrier.workspace(count, task.spline_class.degree),
+        history,
+    )  # fmt: skip
+    status = Status.SOLVED if converged else Status.ITERATION_LIMIT
+    outcome = finish(problem, task, times, status=status)
+    if outcome.status is Status.INFEASIBLE:  # the start may be feasible where the descent ended not
+        outcome = finish(problem, task, start, status=Status.NO_PROGRESS)
+    return replace(
+        outcome,
+        iterations=iterations,
+        history=History(segment_times=np.vstack((start, history[: min(iterations, len(history))]))),
+    )
+
+
+def _stages(settings: Settings) -> np.ndarray:
+    """(n, 3) doublings of the power, most iterations, decrease."""
+    rows = []
+    for index, (samples, power, decrease) in enumerate(settings.ladder):
+        doublings = np.log2(power / barrier.BASE_POWER)
+        if samples not in (8, 16, 32, 64) or doublings != round(doublings):
+            raise InvalidProblem(
+                f"stage {index} of the ladder has {samples} samples and power {power}; they must "
+                "be 8, 16, 32 or 64 and 24 times a power of two"
+            )
+        rows.append((doublings, settings.stage_iterations, decrease))
+    return np.array(rows)

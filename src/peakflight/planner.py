@@ -1,0 +1,118 @@
+"""From a problem to a certified plan: tidy, solve, certify."""
+
+import logging
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import peakflight
+from peakflight import methods
+from peakflight.certificate import certify_answer
+from peakflight.course import Course, tidy
+from peakflight.errors import InvalidProblem, Status
+from peakflight.kernels import jit
+from peakflight.limits import Limits, keeps, limited_values
+from peakflight.problem import Problem
+from peakflight.result import Plan
+from peakflight.spline import is_plain
+
+DEFAULT_METHOD = "peak"
+
+_log = logging.getLogger("peakflight")
+
+
+def plan(
+    problem: Problem | ArrayLike,
+    *,
+    method: str = DEFAULT_METHOD,
+    settings: Any = None,
+    limits: Limits | None = None,
+    **options: Any,
+) -> Plan:
+    """Plan a trajectory and prove that it keeps the limits.
+
+    Parameters
+    ----------
+    problem
+        A `Problem`; or waypoints (K+1, 3) in m, with `limits` and any of the other options of
+        `Problem` beside them. Waypoints closer than 1 mm are then merged, and the plan says so.
+    method
+        One of `peakflight.methods.METHODS`.
+    settings
+        The `Settings` of the method's module; None for its defaults.
+
+    Returns
+    -------
+    A plan whose `report` is certified from the coefficients, whatever the status.
+
+    Raises
+    ------
+    InvalidProblem
+        If what is asked makes no sense; the message names index, value and rule.
+    """
+    began = time.perf_counter()
+    module = methods.find(method)
+    notes: tuple[str, ...] = ()
+    if not isinstance(problem, Problem):
+        problem, notes = _tidied(problem, limits, options)
+    elif limits is not None or options:
+        given = ", ".join(["limits"] * (limits is not None) + list(options))
+        raise InvalidProblem(f"{given} given beside a Problem, which has its own")
+    if settings is None:
+        settings = module.Settings()
+    elif not isinstance(settings, module.Settings):
+        raise InvalidProblem(
+            f"settings is {settings!r}; method {method} takes its own Settings "
+            f"(peakflight.methods.{method}.Settings)"
+        )
+    plain = is_plain(problem.waypoints, problem.spline_class, problem.fixed)
+    with jit.announced(f"{method}-{problem.degree}-{'plain' if plain else 'general'}", _log):
+        impossible = _contradiction(problem)
+        outcome = module.solve(problem, settings)
+        report = certify_answer(problem, outcome.trajectory)
+    status = outcome.status
+    if not report.feasible and status is not Status.INFEASIBLE:
+        status = Status.NUMERICAL
+    lines = [*notes, impossible or outcome.message, *report.problems]
+    return Plan(
+        problem=problem,
+        method=method,
+        status=status,
+        trajectory=outcome.trajectory,
+        report=report,
+        pieces=(1,) * (len(problem.waypoints) - 1),
+        iterations=outcome.iterations,
+        wall_time_s=time.perf_counter() - began,
+        message="; ".join(line for line in lines if line),
+        history=outcome.history,
+        version=peakflight.__version__,
+    )
+
+
+def _tidied(
+    waypoints: ArrayLike, limits: Limits | None, options: dict[str, Any]
+) -> tuple[Problem, tuple[str, ...]]:
+    if limits is None:
+        raise InvalidProblem("limits is missing; give limits=peakflight.Limits(speed=..., ...)")
+    course, notes = tidy(Course(waypoints, yaw=options.pop("yaw", None)))
+    unknown = set(options) - set(Problem.__dataclass_fields__)
+    if unknown:
+        raise InvalidProblem(f"unknown option {min(unknown)!r}")
+    return Problem(course.waypoints, limits=limits, yaw=course.yaw, **options), notes
+
+
+def _contradiction(problem: Problem) -> str:
+    """Which fixed motion exceeds a limit by itself, in words; empty if none does."""
+    for index, state in problem.fixed.items():
+        known = np.isfinite(state).all(axis=1)
+        complete = state[: len(state) if known.all() else int(known.argmin())]
+        for name, value in limited_values(complete).items():
+            limit = getattr(problem.limits, name)
+            if limit is not None and not keeps(name, float(value), limit):
+                return (
+                    f"the motion fixed at waypoint {index} has {name} = {value:g} against a limit "
+                    f"of {limit:g}"
+                )
+    return ""
