@@ -18,13 +18,12 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem
 from peakflight.result import History, Plan, Report
 from peakflight.trajectory import Trajectory
+from peakflight.version import __version__
 
 if TYPE_CHECKING:
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.planner import plan
     from peakflight.spline import minimum_effort_spline
-
-__version__ = "0.1.0"
 
 __all__ = [
     "GRAVITY",

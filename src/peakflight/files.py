@@ -52,15 +52,15 @@ def write_atomically(path: PathLike, content: str | bytes) -> None:
         with tempfile.NamedTemporaryFile(
             dir=path.parent, prefix=f".{path.name}.", delete=False
         ) as stream:
-            temporary = stream.name
+            temporary = Path(stream.name)
             stream.write(data)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
     except OSError as error:
         raise InvalidFile(f"{path}: cannot be written ({_reason(error)})") from None
     finally:
-        if temporary is not None and os.path.exists(temporary):
-            os.unlink(temporary)
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
 
 
 def prepare_folder(path: PathLike) -> Path:

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import peakflight
 from peakflight import methods
 from peakflight.certificate import certify_answer
 from peakflight.course import Course, tidy
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
-from peakflight.problem import Problem
+from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
 from peakflight.spline import is_plain
+from peakflight.version import __version__
 
 DEFAULT_METHOD = "peak"
 
@@ -87,7 +87,7 @@ def plan(
         wall_time_s=time.perf_counter() - began,
         message="; ".join(line for line in lines if line),
         history=outcome.history,
-        version=peakflight.__version__,
+        version=__version__,
     )
 
 
@@ -96,7 +96,9 @@ def _tidied(
 ) -> tuple[Problem, tuple[str, ...]]:
     if limits is None:
         raise InvalidProblem("limits is missing; give limits=peakflight.Limits(speed=..., ...)")
-    course, notes = tidy(Course(waypoints, yaw=options.pop("yaw", None)))
+    course, notes = tidy(
+        Course(as_float_array("waypoints", waypoints, (None, 3)), yaw=options.pop("yaw", None))
+    )
     unknown = set(options) - set(Problem.__dataclass_fields__)
     if unknown:
         raise InvalidProblem(f"unknown option {min(unknown)!r}")
@@ -108,7 +110,7 @@ def _contradiction(problem: Problem) -> str:
     for index, state in problem.fixed.items():
         known = np.isfinite(state).all(axis=1)
         complete = state[: len(state) if known.all() else int(known.argmin())]
-        for name, value in limited_values(complete).items():
+        for name, value in limited_values(list(complete)).items():
             limit = getattr(problem.limits, name)
             if limit is not None and not keeps(name, float(value), limit):
                 return (

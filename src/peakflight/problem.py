@@ -83,9 +83,7 @@ class SplineClass(NamedTuple):
             degree = max(2 * order - 1, DEGREES[0])
         degree = _integer("degree", degree)
         if degree not in DEGREES:
-            raise InvalidProblem(
-                f"degree is {degree}; it must be {DEGREES[0]} to {DEGREES[-1]}"
-            )
+            raise InvalidProblem(f"degree is {degree}; it must be {DEGREES[0]} to {DEGREES[-1]}")
         if order > degree:
             raise InvalidProblem(
                 f"minimize weighs derivative {order}, which is zero at degree {degree}"
@@ -146,15 +144,15 @@ class Problem:
         for name in ("start", "end"):
             state = fixed_state(name, getattr(self, name), axes, spline_class.degree, zeros=rest)
             object.__setattr__(self, name, state)
-        inner = {}
-        for index, state in self.derivatives.items():
+        inner: dict[int, StateLike] = {}
+        for index, given in self.derivatives.items():
             if not 0 < index < legs:
                 raise InvalidProblem(
                     f"derivatives are given at waypoint {index}; inner waypoints are 1 to "
                     f"{legs - 1} (use start and end for the others)"
                 )
             what = f"waypoint {index}"
-            inner[int(index)] = fixed_state(what, state, axes, spline_class.degree, zeros=0)
+            inner[int(index)] = fixed_state(what, given, axes, spline_class.degree, zeros=0)
         object.__setattr__(self, "derivatives", inner)
 
     @cached_property
@@ -231,7 +229,9 @@ def as_float_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) 
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise InvalidProblem(f"{name} must be numbers in an array, all rows of one length") from None
+        raise InvalidProblem(
+            f"{name} must be numbers in an array, all rows of one length"
+        ) from None
     wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
     if array.ndim != len(shape) or any(
         n is not None and n != m for n, m in zip(shape, array.shape, strict=True)

@@ -173,9 +173,7 @@ class Plan:
             kappa = self.history.kappa
             values["history"] = {
                 "segment_times": self.history.segment_times.tolist(),
-                "kappa": None
-                if kappa is None
-                else np.where(np.isnan(kappa), None, kappa).tolist(),  # type: ignore[call-overload]
+                "kappa": None if kappa is None else np.where(np.isnan(kappa), None, kappa).tolist(),  # type: ignore[call-overload]
             }
         return values
 

@@ -1,4 +1,4 @@
-"""Sub-problem 1: the smoothest spline through waypoints at given segment times (Eq. mellinger_poly).
+"""Sub-problem 1 (Eq. mellinger_poly): the smoothest spline through waypoints at given times.
 
 The cost is quadratic in the coefficients and the constraints are linear, so the optimum is the
 solution of a banded linear system: O(K) in time and memory, whatever the class of spline.
@@ -63,6 +63,7 @@ class SplineTask:
             joints = np.zeros((count, b, axes))
             joints[0], joints[-1] = fixed[0], fixed[count - 1]
             workspace = (
+                (0,) * axes,
                 fresh(basis.energy(degree, b + 1)),
                 joints,
                 np.zeros((count, b, b)),
@@ -111,9 +112,9 @@ class SplineTask:
         starts = self.waypoints[:-1]
         if self.layered is None:
             assert self.simple is not None
-            energy, joints, factor, coupling, powers, _ = self.simple
+            shape, energy, joints, factor, coupling, powers, _ = self.simple
             classical.solve(
-                self.rows, (0,) * axes, energy, self.waypoints, times, joints, factor, coupling,
+                self.rows, shape, energy, self.waypoints, times, joints, factor, coupling,
                 powers, data,
             )  # fmt: skip
         else:

@@ -136,7 +136,9 @@ class Trajectory:
     def sample(self, count: int, derivative: int = 0) -> np.ndarray:
         """(K, count, D): values at `count` even points of each piece, both ends included."""
         pieces = np.arange(len(self))[:, None]
-        return self.at(pieces, self.segment_times[:, None] * np.linspace(0.0, 1.0, count), derivative)
+        return self.at(
+            pieces, self.segment_times[:, None] * np.linspace(0.0, 1.0, count), derivative
+        )
 
     def derivative(self, order: int = 1) -> Self:
         """The trajectory of a derivative; its degree is lower by `order`, but not below 0."""
@@ -183,7 +185,7 @@ class Trajectory:
         return left, type(self)(coefficients, times, float(t))
 
     def join(self, other: Self) -> Self:
-        """This trajectory, then `other`, moved in time to follow at once.
+        """Append `other`, moved in time to follow at once.
 
         Nothing is smoothed: the motion jumps where the two do not meet.
         """
@@ -249,9 +251,7 @@ class Trajectory:
         for name in ("coefficients", "segment_times"):
             if name not in values:
                 raise InvalidProblem(f"{name} is missing")
-        return cls(
-            values["coefficients"], values["segment_times"], values.get("start_time", 0.0)
-        )
+        return cls(values["coefficients"], values["segment_times"], values.get("start_time", 0.0))
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
@@ -276,6 +276,9 @@ def _shift_origin(coefficients: np.ndarray, offset: float) -> np.ndarray:
     """Coefficients (N+1, D) of the same polynomial around another origin (Taylor shift)."""
     count = len(coefficients)
     matrix = np.array(
-        [[comb(j, i) * offset ** (j - i) if j >= i else 0.0 for j in range(count)] for i in range(count)]
+        [
+            [comb(j, i) * offset ** (j - i) if j >= i else 0.0 for j in range(count)]
+            for i in range(count)
+        ]
     )
     return matrix @ coefficients

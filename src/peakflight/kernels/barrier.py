@@ -26,6 +26,8 @@ NEGLIGIBLE = -20.0
 BASE_POWER = 24
 """Powers p are this times a power of two: then m^(p/e) is a product of squares for every e."""
 
+WATCH = 8.0
+"""A limit matters on a piece for a whole stage if it comes nearer than this over sqrt(p)."""
 BATCH = 64
 """Samples that are worked on together; the samples of a piece must divide it."""
 
@@ -42,17 +44,22 @@ def workspace(count: int, degree: int) -> tuple[np.ndarray, ...]:
         np.zeros(BATCH),
         np.zeros(BATCH),
         np.zeros(BATCH),
+        np.zeros(EXPONENTS.size, dtype=np.bool_),
+        np.zeros(4, dtype=np.bool_),
     )
 
 
 @inner
-def evaluate(rows, spline, times, limits, gravity, tables, doublings, reference, work, gradient):
-    """f and its gradient (K,) by log t; infinite where the spline or f cannot be computed.
+def evaluate(
+    rows, spline, times, limits, gravity, tables, watched, doublings, reference, work, gradient
+):
+    """F and its gradient (K,) by log t; infinite where the spline or f cannot be computed.
 
     spline: waypoints, and the two workspaces of `solve_spline`; limits: as `Limits.as_array`;
-    tables (N, 4, S) of `basis.sample_tables`; doublings: p = 24 * 2^doublings.
+    tables (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
+    p = 24 * 2^doublings.
     """
-    data, slope, samples, squares, weights, vertical, values, grown = work
+    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders = work
     power = BASE_POWER * 2.0**doublings
     floor = np.exp(NEGLIGIBLE / power)  # of m^(1/e)
     cap = np.exp(CAP / power)
@@ -66,15 +73,22 @@ def evaluate(rows, spline, times, limits, gravity, tables, doublings, reference,
     for begin in range(0, times.size, batch):
         end = min(begin + batch, times.size)
         count = (end - begin) * each
+        for row in range(4):
+            orders[row] = False
+        for kind in range(EXPONENTS.size):
+            kinds[kind] = False
+            for k in range(begin, end):
+                kinds[kind] |= watched[k, kind]
+            orders[KIND_ORDERS[kind] - 1] |= kinds[kind]
         for k in range(begin, end):
             total += times[k]
             gradient[k] = times[k] / reference
-            _sample(rows, data, k, times[k], tables, by_piece, k - begin)
-        _square(samples, count, squares)
-        lowest = 4  # range of the derivatives that some limit pulls at
-        highest = -1
+            _sample(rows, data, k, times[k], tables, orders, by_piece, k - begin)
+        _square(samples, count, orders, squares)
+        lowest = np.int64(4)  # range of the derivatives that some limit pulls at
+        highest = np.int64(-1)
         for kind in range(EXPONENTS.size):
-            if not limits[kind] > 0.0:
+            if not kinds[kind]:
                 continue
             row = KIND_ORDERS[kind] - 1
             measure(kind, samples, squares, count, row, limits[kind], gravity, values)
@@ -102,41 +116,79 @@ def evaluate(rows, spline, times, limits, gravity, tables, doublings, reference,
 
 
 @inner
+def watch(rows, spline, times, limits, gravity, tables, doublings, work, watched):
+    """Watched (K, kinds) <- which limits come near enough to matter on which pieces.
+
+    tables: of BATCH samples. The higher the power, the less the times will change, and the nearer
+    a limit must be.
+    """
+    data, _, samples, squares, _, _, values, _, _kinds, orders = work
+    nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
+    if not solve_spline(rows, spline[0], spline[1], spline[2], times, data):
+        return
+    for row in range(4):
+        orders[row] = True
+    for k in range(times.size):
+        _sample(rows, data, k, times[k], tables, orders, samples.reshape(3, 4, 1, BATCH), 0)
+        _square(samples, BATCH, orders, squares)
+        for kind in range(EXPONENTS.size):
+            watched[k, kind] = False
+            if limits[kind] > 0.0:
+                row = KIND_ORDERS[kind] - 1
+                measure(kind, samples, squares, BATCH, row, limits[kind], gravity, values)
+                bound = max(nearest, 0.0) ** EXPONENTS[kind]
+                watched[k, kind] = nearest <= 0.0 or _count_above(values, BATCH, bound) > 0
+
+
+@inner
 def solve_spline(rows, waypoints, simple, layered, times, data):
     """End data (K, N, D) of the spline for given times; False where there is none.
 
     simple is a workspace of `kernels.classical`, layered one of `kernels.general`. One of them is
     None: that is known when the kernel is compiled, and its branch is left out.
     """
-    if layered is None:
-        energy, joints, factor, coupling, powers, _ = simple
+    solved = True
+    if simple is None:
+        pass
+    else:
+        axes, energy, joints, factor, coupling, powers, _ = simple
         classical.solve(
-            rows, (0, 0, 0), energy, waypoints, times, joints, factor, coupling, powers, data
+            rows, axes, energy, waypoints, times, joints, factor, coupling, powers, data
         )
-        return True
-    layout, cost, factors, values, starts = layered
-    return general.solve(layout, cost, waypoints, times, 1, factors, values, data, starts) == 0
+    if layered is None:
+        pass
+    else:
+        layout, cost, factors, values, starts = layered
+        code = general.solve(layout, cost, waypoints, times, 1, factors, values, data, starts)
+        solved = code == 0
+    return solved
 
 
 @inner
 def spline_adjoint(rows, waypoints, simple, layered, times, data, slope, gradient):
     """gradient (K,) += derivative by log times of what has derivative `slope` by the end data."""
-    if layered is None:
-        energy, _, factor, coupling, _, multipliers = simple
+    if simple is None:
+        pass
+    else:
+        axes, energy, _, factor, coupling, _, multipliers = simple
         classical.adjoint(
-            rows, (0, 0, 0), energy, times, factor, coupling, data, slope, multipliers, gradient
+            rows, axes, energy, times, factor, coupling, data, slope, multipliers, gradient
         )
+    if layered is None:
+        pass
     else:
         layout, cost, factors, values, _ = layered
         general.adjoint(layout, cost, waypoints, times, factors, values, slope, gradient)
 
 
 @vector
-def _sample(rows, data, piece, time, tables, out, place):
-    """out (3, 4, place, S) <- derivatives 1 to 4 of a piece."""
+def _sample(rows, data, piece, time, tables, orders, out, place):
+    """Out (3, 4, place, S) <- derivatives 1 to 4 of a piece, those that `orders` names."""
     scale = 1.0
     for row in range(4):
         scale /= time
+        if not orders[row]:
+            continue
         for d in range(3):
             for q in range(tables.shape[2]):
                 value = 0.0
@@ -146,9 +198,11 @@ def _sample(rows, data, piece, time, tables, out, place):
 
 
 @vector
-def _square(samples, count, out):
-    """out (4, S) <- squared norms of samples (3, 4, S)."""
+def _square(samples, count, orders, out):
+    """Out (4, S) <- squared norms of samples (3, 4, S), of the derivatives that `orders` names."""
     for row in range(4):
+        if not orders[row]:
+            continue
         for q in range(count):
             x = samples[0, row, q]
             y = samples[1, row, q]
@@ -175,7 +229,7 @@ def _count_above(values, count, bound):
 
 @vector
 def _raise(values, count, base, power, doublings, capped, out):
-    """out <- values^(power / base) with power = 24 * 2^doublings, by squaring; returns its sum.
+    """Out <- values^(power / base) with power = 24 * 2^doublings, by squaring; returns its sum.
 
     If capped, the sum is of the parabolas beyond CAP, and out their slope by the logarithm.
     """
@@ -212,7 +266,7 @@ def _raise(values, count, base, power, doublings, capped, out):
 
 @vector
 def _pull(samples, weights, vertical, count, row):
-    """samples <- slope of the barrier by each of them."""
+    """Samples <- slope of the barrier by each of them."""
     for d in range(3):
         for q in range(count):
             samples[d, row, q] *= weights[row, q]

@@ -101,9 +101,7 @@ def _columns(degree: int) -> list[list[Fraction]]:
 def _invert(matrix: list[list[Fraction]]) -> list[list[Fraction]]:
     """Gauss-Jordan elimination in rationals."""
     size = len(matrix)
-    rows = [
-        [*row, *(Fraction(i == j) for j in range(size))] for i, row in enumerate(matrix)
-    ]
+    rows = [[*row, *(Fraction(i == j) for j in range(size))] for i, row in enumerate(matrix)]
     for i in range(size):
         pivot = next(k for k in range(i, size) if rows[k][i])
         rows[i], rows[pivot] = rows[pivot], rows[i]

@@ -202,22 +202,23 @@ def _quotient(
     degree, error = _control_points(
         coefficients, piece, time, order, gravity, tables[0], tables[2], points
     )
+    plain = kind not in (4, 5)
+    if kind == 5:  # 1 / |a + g e3|^2
+        _square(points, 0, degree, error, tables[1], -1.0, denominators)
+        for i in range(2 * degree + 1):
+            numerators[0, i] = 1.0
+        return 2 * degree, plain, True
     if kind == 4:  # |a_xy|^2 / (a_z + g)^2, the squared tangent of the tilt
         for i in range(degree + 1):
             numerators[0, i] = error - points[i, 2]
-        _, high, _ = _largest(numerators, denominators, True, degree, 1e-3, ends)
+        _, high, _ = _largest(numerators, denominators, not plain, degree, 1e-3, ends)
         if not high < 0.0:
-            return 2 * degree, False, False
-        _square(points, 0, 2, degree, error, tables[1], 1.0, numerators)
-        _square(points, 2, 3, degree, error, tables[1], -1.0, denominators)
-        return 2 * degree, False, True
-    if kind == 5:  # 1 / |a + g e3|^2
-        _square(points, 0, 3, degree, error, tables[1], -1.0, denominators)
-        for i in range(2 * degree + 1):
-            numerators[0, i] = 1.0
-        return 2 * degree, False, True
-    _square(points, 0, 3, degree, error, tables[1], 1.0, numerators)
-    return 2 * degree, True, True
+            return 2 * degree, plain, False
+        _square(points, 2, degree, error, tables[1], -1.0, denominators)
+        for i in range(degree + 1):
+            points[i, 2] = 0.0
+    _square(points, 0, degree, error, tables[1], 1.0, numerators)
+    return 2 * degree, plain, True
 
 
 @inner
@@ -231,12 +232,12 @@ def _ratio(kind, value, limit, is_bound):
         ratio = root * limit
     else:
         ratio = root / limit
-    return min(ratio * slack, UNBOUNDED) if ratio == ratio else UNBOUNDED
+    return UNBOUNDED if np.isnan(ratio) else min(ratio * slack, UNBOUNDED)
 
 
 @inner
 def _control_points(coefficients, piece, time, order, gravity, convert, factorials, points):
-    """points (n+1, 3) <- Bernstein control points of a derivative, with g added to the third axis.
+    """Points (n+1, 3) <- Bernstein control points of a derivative, with g added to the third axis.
 
     Returns their degree and a bound of the rounding error of each entry's norm.
     """
@@ -269,20 +270,21 @@ def _control_points(coefficients, piece, time, order, gravity, convert, factoria
 
 
 @inner
-def _square(points, first, last, degree, error, product, sign, out):
-    """out[0] <- control points of the squared norm of some axes, moved by sign times a bound of
-    all rounding errors, those of subdivision included."""
+def _square(points, first, degree, error, product, sign, out):
+    """out[0] <- control points of the squared norm, over the axes from `first` on, moved by sign
+    times a bound of all rounding errors, those of subdivision included.
+    """
     largest = 0.0
     for i in range(2 * degree + 1):
         out[0, i] = 0.0
     for i in range(degree + 1):
         norm = 0.0
-        for d in range(first, last):
+        for d in range(first, 3):
             norm += points[i, d] * points[i, d]
         largest = max(largest, norm)
         for j in range(degree + 1):
             dot = 0.0
-            for d in range(first, last):
+            for d in range(first, 3):
                 dot += points[i, d] * points[j, d]
             out[0, i + j] += product[degree, i, j] * dot
     rounding = (10 + 2 * degree + 8 * degree * DEPTH) * EPSILON
@@ -322,7 +324,7 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
         if bound <= low + tolerance * abs(low):
             high = max(high, bound)
             continue
-        if waiting >= DEPTH or splits > SPLITS or bound != bound:
+        if waiting >= DEPTH or splits > SPLITS or np.isnan(bound):
             high = bound if not bound <= high else high  # NaN stays
             continue
         at = 0.5

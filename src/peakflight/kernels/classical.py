@@ -105,7 +105,7 @@ def inverse_powers(rows, powers, row, time):
 
 @inner
 def backsolve(rows, axes, factor, coupling, values):
-    """values (K+1, b, D) <- inverse of the matrix that `solve` has factorised, times values."""
+    """Values (K+1, b, D) <- inverse of the matrix that `solve` has factorised, times values."""
     b = len(rows) // 2
     count = values.shape[0] - 1
     for k in range(2, count):
@@ -138,7 +138,7 @@ def backsolve(rows, axes, factor, coupling, values):
 
 @kernel
 def adjoint(rows, axes, energy, times, factor, coupling, data, slope, multipliers, gradient):
-    """gradient (K,) += derivative by log times of a function with derivative `slope` by the data.
+    """Gradient (K,) += derivative by log times of a function with derivative `slope` by the data.
 
     slope (K, N, D) is dF/ddata of a function F that depends on times through the data alone;
     multipliers (K+1, b, D) is scratch.

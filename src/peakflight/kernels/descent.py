@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from peakflight.kernels.barrier import BASE_POWER, evaluate
+from peakflight.kernels.barrier import BASE_POWER, evaluate, watch
 from peakflight.kernels.jit import inner, kernel
 
 ARMIJO = 1e-4
@@ -22,10 +22,11 @@ PATIENCE = 5
 
 
 @kernel
-def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, history):
+def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory, work, history):
     """Minimise the barrier functions of a ladder of stages, each from the last one's result.
 
-    times (K,) is replaced; tables: one of `basis.sample_tables` a stage; work: `barrier.workspace`; stages (n, 3): doublings
+    times (K,) is replaced; tables: one of `basis.sample_tables` a stage, dense: one more, of the
+    most samples; work: `barrier.workspace`; stages (n, 3): doublings
     of the power, most iterations, relative decrease at which the stage ends; memory: pairs that
     L-BFGS keeps; history (rows, K) gets the times of the first iterations.
 
@@ -38,14 +39,16 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
         np.zeros(memory),
         np.zeros(memory),
     )
-    steps, changes, inverses, _ = pairs
+    _steps, changes, inverses, _ = pairs
     x = np.log(times)
     gradient = np.zeros(count)
     direction = np.zeros(count)
     trial = np.zeros(count)
     trial_gradient = np.zeros(count)
     diagonal = np.zeros(count)
-    kept = 0  # pairs stored so far
+    watched = np.zeros((count, limits.size), dtype=np.bool_)
+    none = np.int64(0)  # a bare 0 is a type of its own, for which callees compile once more
+    kept = none  # pairs stored so far
     shrink = 0.0  # scale of the initial inverse Hessian, from the last pair
     power = 0.0
     iterations = 0
@@ -66,10 +69,12 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
                 changes[i, k] *= growth
         reference = 0.0
         for k in range(count):
-            reference += np.exp(x[k]) / count
+            times[k] = np.exp(x[k])
+            reference += times[k] / count
             trial[k] = x[k]
         for k in range(count):
-            diagonal[k] = reference / np.exp(x[k])
+            diagonal[k] = reference / times[k]
+        watch(rows, spline, times, limits, gravity, dense, doublings, work, watched)
         iteration = -1  # of this stage; the first evaluation is accepted as it is
         value = np.inf
         slope = 0.0
@@ -82,8 +87,8 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
             for k in range(count):
                 times[k] = np.exp(trial[k])
             trial_value = evaluate(
-                rows, spline, times, limits, gravity, tables[stage], doublings, reference, work,
-                trial_gradient,
+                rows, spline, times, limits, gravity, tables[stage], watched, doublings, reference,
+                work, trial_gradient,
             )  # fmt: skip
             evaluations += 1
             if iteration >= 0:  # line search: halve or double until the weak Wolfe conditions hold
@@ -105,7 +110,7 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
                 if not trial_value < value:
                     if kept == 0:
                         break  # not even steepest descent finds anything lower
-                    kept = 0
+                    kept = none
                 else:
                     shrink, kept = _remember(
                         pairs, kept, x, trial, gradient, trial_gradient, diagonal, shrink
@@ -133,7 +138,7 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
                 break
             slope = _direction(pairs, kept, gradient, diagonal, shrink, direction)
             if not slope < 0.0:
-                kept = 0
+                kept = none
                 slope = _direction(pairs, kept, gradient, diagonal, shrink, direction)
             if not slope < 0.0:
                 break
@@ -153,7 +158,7 @@ def descend(rows, spline, times, limits, gravity, tables, stages, memory, work, 
 
 @inner
 def _remember(pairs, kept, x, trial, gradient, trial_gradient, diagonal, shrink):
-    """Move to the trial point and store the step; returns the scale of the Hessian and the count."""
+    """Move to the trial point and store the step; returns scale of the Hessian and count."""
     steps, changes, inverses, _ = pairs
     slot = kept % steps.shape[0]
     product = 0.0
@@ -173,7 +178,7 @@ def _remember(pairs, kept, x, trial, gradient, trial_gradient, diagonal, shrink)
 
 @inner
 def _direction(pairs, kept, gradient, diagonal, shrink, direction):
-    """direction <- minus the L-BFGS inverse Hessian times the gradient; returns their product."""
+    """Direction <- minus the L-BFGS inverse Hessian times the gradient; returns their product."""
     steps, changes, inverses, weights = pairs
     memory, count = steps.shape
     used = min(kept, memory)

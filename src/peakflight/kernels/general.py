@@ -66,7 +66,7 @@ def solve(layout, cost, waypoints, times, rounds, factors, values, data, starts)
 
 @kernel
 def adjoint(layout, cost, waypoints, times, factors, values, slope, gradient):
-    """gradient (K,) += derivative by log times of a function with derivative `slope` by the data.
+    """Gradient (K,) += derivative by log times of a function with derivative `slope` by the data.
 
     slope (K, N, D) is dF/ddata of a function F that depends on times through the data alone.
     """
@@ -78,7 +78,7 @@ def adjoint(layout, cost, waypoints, times, factors, values, slope, gradient):
         _powers(times[k], powers)
         for d in range(values.shape[1]):
             for i in range(layout.slot.size):
-                if i == 0 or i == left:
+                if i in (0, left):
                     push = slope[k, 0, d] if i == left else -slope[k, 0, d]
                 else:
                     order = _order(i, left)
@@ -146,7 +146,7 @@ def _powers(time, out):
 
 @inner
 def _end_data(layout, values, waypoints, origin, powers, k, d, out):
-    """out (N+1,) <- full end data of piece k in axis d, positions relative to `origin`."""
+    """Out (N+1,) <- full end data of piece k in axis d, positions relative to `origin`."""
     left = _left(layout)
     for i in range(layout.slot.size):
         node = k + _side(i, left)
@@ -159,7 +159,7 @@ def _end_data(layout, values, waypoints, origin, powers, k, d, out):
 
 @inner
 def _residual(layout, cost, waypoints, times, values, out):
-    """out (n, D) <- by how much the optimality conditions fail at `values`, with opposite sign."""
+    """Out (n, D) <- by how much the optimality conditions fail at `values`, with opposite sign."""
     slots = layout.free.shape[2]
     left = _left(layout)
     piece = np.empty(layout.slot.size)
@@ -297,7 +297,7 @@ def _factorise(layout, cost, times, factors):
 
 @inner
 def _piece_energy(cost, time, out):
-    """out (N+1, N+1) <- energy of a piece in full end data by normalised time."""
+    """Out (N+1, N+1) <- energy of a piece in full end data by normalised time."""
     out[:] = 0.0
     for s in range(cost.orders.size):
         factor = cost.weights[s] * time ** (1.0 - 2.0 * cost.orders[s])
@@ -335,7 +335,7 @@ def _eliminate(band, pivots, width):
 
 @inner
 def _substitute(layout, factors, values):
-    """values (n, D) <- inverse of the unscaled matrix, times values; fixed slots give zero."""
+    """Values (n, D) <- inverse of the unscaled matrix, times values; fixed slots give zero."""
     scale, band, pivots = factors
     slots = layout.free.shape[2]
     size = values.shape[0]

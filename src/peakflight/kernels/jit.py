@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numba.core.config
 import numpy as np
 from numpy.typing import ArrayLike
+
+_config: Any = numba.core.config
 
 
 def _cache_folder() -> str:
@@ -23,8 +26,8 @@ def _cache_folder() -> str:
     here = Path(__file__).parent
     digest = hashlib.sha256(b"".join(f.read_bytes() for f in sorted(here.glob("*.py"))))
     name = f"peakflight-{digest.hexdigest()[:12]}"
-    if numba.config.CACHE_DIR:
-        return str(Path(numba.config.CACHE_DIR) / name)
+    if _config.CACHE_DIR:
+        return str(Path(_config.CACHE_DIR) / name)
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     for folder in (here / "__pycache__", home):
         try:
@@ -42,12 +45,12 @@ FOLDER = _cache_folder()
 
 def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
-        others = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = FOLDER
+        others = _config.CACHE_DIR
+        _config.CACHE_DIR = FOLDER
         try:
             return numba.njit(cache=True, error_model="numpy", **options)(function)
         finally:
-            numba.config.CACHE_DIR = others
+            _config.CACHE_DIR = others
 
     return decorate
 
@@ -72,7 +75,7 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
     `name` tells one set of kernels from others; a mark beside the cache remembers it.
     """
     mark = Path(FOLDER) / f"{name}.ready"
-    known = name in _ready or mark.exists() or numba.config.DISABLE_JIT
+    known = name in _ready or mark.exists() or _config.DISABLE_JIT
     if not known:
         log.warning("compiling the planner for this machine, once; this takes some seconds")
     yield
@@ -82,5 +85,5 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
 
 
 def fresh(array: ArrayLike) -> np.ndarray:
-    """A writable, C-contiguous float64 copy: the one kind of array that kernels are compiled for."""
+    """Copy to the one kind of array that kernels are compiled for."""
     return np.array(array, dtype=np.float64, order="C", copy=True)

@@ -6,8 +6,9 @@ slower the sample would have to be passed (design's "uniform stretch"): then no 
 another in the barrier of `kernels.barrier`.
 
 The slope of (log m)/e by a derivative d is given as weight * d + vertical * e3, which suits
-everything that knows no direction but gravity's. A new kind is one pair of functions, values and slopes, a line in `measure` and
-`add_slopes`, an exponent and an order. Kinds are numbered as in `limits.KINDS`.
+everything that knows no direction but gravity's. A new kind is one pair of functions, values and
+slopes, a line in `measure` and `add_slopes`, an exponent and an order. Kinds are numbered as in
+`limits.KINDS`.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ SOFTNESS = 1e-3
 
 @inner
 def measure(kind, samples, squares, count, row, limit, gravity, values):
-    """values <- m of the first `count` samples.
+    """Values <- m of the first `count` samples.
 
     samples (3, 4, S) are derivatives 1 to 4, squares (4, S) their squared norms; row: which
     derivative the kind is about, less one.
@@ -45,7 +46,7 @@ def measure(kind, samples, squares, count, row, limit, gravity, values):
 def add_slopes(
     kind, samples, squares, count, row, limit, gravity, values, grown, weights, vertical
 ):
-    """weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m."""
+    """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m."""
     if kind == 1:
         _add_thrust(samples, count, row, limit, gravity, values, grown, weights, vertical)
     elif kind == 4:

@@ -54,4 +54,4 @@ def find(name: str) -> Method:
     """
     if name not in METHODS:
         raise InvalidProblem(f"unknown method {name!r}; known are {', '.join(METHODS)}")
-    return import_module(f"peakflight.methods.{name}")  # type: ignore[return-value]
+    return import_module(f"peakflight.methods.{name}")

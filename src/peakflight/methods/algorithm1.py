@@ -26,7 +26,7 @@ DIVERGED = 1e6
 class Algorithm1Settings:
     """Tuning of Algorithm 1."""
 
-    learning_rate: float = 0.3
+    learning_rate: float = 0.4
     """delta_1 of Eq. t_i_new and Eq. t_i_new_all."""
     neighbour_rate: float = 0.05
     """delta_2 of Eq. t_i_new_pm; the paper does not print either rate."""
@@ -59,7 +59,8 @@ def solve(problem: Problem, settings: Algorithm1Settings) -> Outcome:
     best, shortest = times, np.inf
     converged = False
     iteration = 0
-    for iteration in range(1, settings.iterations + 1):
+    while not converged and iteration < settings.iterations:
+        iteration += 1
         ratios = peak_ratios(task.solve(times), problem.limits)
         if len(kept) < rows:
             kept.append(times)
@@ -69,8 +70,6 @@ def solve(problem: Problem, settings: Algorithm1Settings) -> Outcome:
         converged = bool((np.abs(kappa - 1.0) <= settings.band).all())
         if bound < shortest or converged:
             best, shortest = times, bound
-        if converged:
-            break
         times = update_times(times, kappa, settings)
         if not 1.0 / DIVERGED < times.sum() / first < DIVERGED:
             break

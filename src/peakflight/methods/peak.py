@@ -7,14 +7,14 @@ sub-problem 1 by its adjoint. Powers rise from stage to stage, from a rough shap
 leads to up to limits that are hard in all but name; the exact stretch does the rest.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from peakflight.certificate import peak_ratios
 from peakflight.errors import InvalidProblem, Status
-from peakflight.kernels import basis, barrier, descent
+from peakflight.kernels import barrier, basis, descent
 from peakflight.limits import GRAVITY
 from peakflight.methods import Outcome, algorithm1
 from peakflight.methods.algorithm1 import Algorithm1Settings
@@ -31,7 +31,7 @@ LADDER: tuple[Stage, ...] = (
     (8, 96, 1e-3),
     (16, 384, 1e-4),
     (32, 1536, 5e-5),
-    (64, 6144, 3e-6),
+    (64, 6144, 7e-6),
 )
 """Starting at the power 6 is what makes the plain start safe; ending at 6144 leaves 1e-4."""
 
@@ -51,7 +51,7 @@ class Settings:
     """Pairs that L-BFGS keeps."""
     history_size: int = 1_000_000
     """Most segment times kept for the history, of all iterations together."""
-    paper: Algorithm1Settings = Algorithm1Settings()
+    paper: Algorithm1Settings = field(default_factory=Algorithm1Settings)
     """Learning rates and the rest of variant paper."""
 
 
@@ -65,14 +65,14 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     times = proportional_times(problem)
     times *= estimated_stretch(peak_ratios(task.solve(times), problem.limits))
     start = times.copy()
-    count = len(times)
+    count, degree = len(times), task.spline_class.degree
     history = np.empty((max(settings.history_size // count, 1), count))
     iterations, _, converged = descent.descend(
         task.rows, (task.waypoints, task.simple, task.layered), times,
         problem.limits.as_array(), GRAVITY,
-        tuple(basis.sample_tables(task.spline_class.degree, s) for s, _, _ in settings.ladder),
-        _stages(settings), settings.memory, barrier.workspace(count, task.spline_class.degree),
-        history,
+        tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
+        basis.sample_tables(degree, barrier.BATCH), _stages(settings), settings.memory,
+        barrier.workspace(count, degree), history,
     )  # fmt: skip
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT
     outcome = finish(problem, task, times, status=status)

@@ -1,0 +1,130 @@
+"""How long it takes to begin: the import, the first plan of all, and a plan by command line."""
+
+import json
+import statistics
+import tempfile
+from pathlib import Path
+
+from benchmarks.courses import FOLDER
+from benchmarks.processes import ProcessFailed, median, python
+from benchmarks.report import Cell, Column, Row, Table, failure, judged
+from benchmarks.scope import Scope
+
+IMPORT_BAR = 0.3
+FIRST_BAR = 20.0
+COMMAND_BAR = 1.5
+PICTURES = (".png", ".svg", ".pdf")
+
+COLUMNS: list[Column] = [
+    ("what", ""), ("wall [s]", ".3f"), ("CPU [s]", ".3f"), ("wall, least [s]", ".3f"),
+    ("wall, most [s]", ".3f"), ("processes", "d"),
+]  # fmt: skip
+IMPORTED = """
+import json, sys
+import peakflight
+heavy = ("numba", "llvmlite", "scipy", "matplotlib", "click", "rich", "yaml")
+print(json.dumps([name for name in heavy if name in sys.modules]))
+"""
+FIRST_PLAN = """
+import peakflight as pf
+course = pf.read_course({course!r})
+limits = pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+plan = pf.plan(course.waypoints, limits=limits)
+assert plan.feasible, plan.message
+"""
+LIMITS = "speed=5,thrust_acceleration=15.5,jerk=62,snap=800"
+
+
+def run(scope: Scope) -> list[Table]:
+    """One table; every process is fresh, and wall times are what the bars are about."""
+    rows = [*_imports(scope.pick(3, 7)), *_first_plan(), *_command(scope.pick(2, 5))]
+    text = "Fresh processes, byte code kept, files warm. CPU time is user and system time of all threads."
+    return [Table(title="Start-up", note=text, columns=COLUMNS, rows=rows)]
+
+
+def _imports(count: int) -> list[Row]:
+    what: dict[str, Cell] = {"what": "import peakflight, less import numpy", "processes": count}
+    bar = f"<= {IMPORT_BAR} s"
+    try:
+        found = json.loads(python(["-c", IMPORTED]).output)  # also keeps the byte code
+        pairs = [
+            (python(["-c", "import peakflight"]), python(["-c", "import numpy"]))
+            for _ in range(count)
+        ]
+    except ProcessFailed as error:
+        return [failure(what, error, bar)]
+    walls = [ours.wall - base.wall for ours, base in pairs]
+    cells: dict[str, Cell] = {
+        **what,
+        "wall [s]": statistics.median(walls),
+        "CPU [s]": statistics.median(ours.cpu - base.cpu for ours, base in pairs),
+        "wall, least [s]": min(walls),
+        "wall, most [s]": max(walls),
+    }
+    check = Row(
+        cells={"what": "import peakflight leaves numba alone", "processes": 1},
+        bar="no numba, no compiler",
+        met=not {"numba", "llvmlite"} & set(found),
+        note=f"also imported: {', '.join(found)}" if found else "",
+    )
+    return [judged(cells, "wall [s]", IMPORT_BAR, bar), check]
+
+
+def _first_plan() -> list[Row]:
+    rows = []
+    code = FIRST_PLAN.format(course=str(FOLDER / "random_10.json"))
+    what: dict[str, Cell] = {
+        "what": "first plan ever (random_10, nothing compiled)",
+        "processes": 1,
+    }
+    bar = f"<= {FIRST_BAR:g} s"
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            first = python(["-c", code], NUMBA_CACHE_DIR=folder)
+            second = [python(["-c", code], NUMBA_CACHE_DIR=folder) for _ in range(3)]
+        except ProcessFailed as error:
+            return [failure(what, error, bar)]
+        size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
+    cells: dict[str, Cell] = {**what, "wall [s]": first.wall, "CPU [s]": first.cpu}
+    rows.append(
+        judged(cells, "wall [s]", FIRST_BAR, bar, f"the cache takes {size / 2**20:.1f} MiB")
+    )
+    wall, cpu = median(second)
+    cells = {
+        "what": "the same plan in the next process",
+        "wall [s]": wall,
+        "CPU [s]": cpu,
+        "wall, least [s]": min(r.wall for r in second),
+        "wall, most [s]": max(r.wall for r in second),
+        "processes": len(second),
+    }
+    return [*rows, Row(cells=cells)]
+
+
+def _command(count: int) -> list[Row]:
+    what: dict[str, Cell] = {"what": "peakflight plan random_10, pictures included"}
+    bar = f"<= {COMMAND_BAR} s"
+    course = str(FOLDER / "random_10.json")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        command = ["-m", "peakflight", "plan", course, "--limits", LIMITS, "-o", str(folder / "o")]
+        try:
+            python(command, cwd=folder)
+            runs = [python(command, cwd=folder) for _ in range(count)]
+        except ProcessFailed as error:
+            return [failure(what, error, bar)]
+        written = sorted(path.name for path in (folder / "o").rglob("*") if path.is_file())
+    wall, cpu = median(runs)
+    cells: dict[str, Cell] = {
+        **what,
+        "wall [s]": wall,
+        "CPU [s]": cpu,
+        "wall, least [s]": min(r.wall for r in runs),
+        "wall, most [s]": max(r.wall for r in runs),
+        "processes": count,
+    }
+    row = judged(cells, "wall [s]", COMMAND_BAR, bar, f"writes {', '.join(written)}")
+    if "plan.json" not in written or not any(n.endswith(PICTURES) for n in written):
+        row.met = False
+        row.note = f"failed: no plan.json or no picture among {', '.join(written) or 'nothing'}"
+    return [row]

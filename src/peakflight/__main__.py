@@ -1,0 +1,5 @@
+"""`python -m peakflight`: the command line."""
+
+from peakflight.cli import main
+
+main()

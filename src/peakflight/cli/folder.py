@@ -1,0 +1,93 @@
+"""The folder that a command fills: all of its files together, or none."""
+
+import os
+import re
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from peakflight.errors import InvalidFile
+from peakflight.files import PathLike, prepare_folder
+
+LONGEST_NAME = 80
+"""Characters of a course's name in that of its folder."""
+
+_ODD = re.compile(r"[^\w.+-]+")
+"""What does not belong in the name of a folder on every system."""
+
+
+class OutputFolder:
+    """Gathers files out of sight, and moves them into a folder when all are complete.
+
+    Made before the work whose results it takes, so that a folder that cannot be written to is
+    found at once. When an error ends the work, the files that are complete are kept; when the user
+    does, nothing is, and neither is a folder that was not there before.
+
+    Raises
+    ------
+    InvalidFile
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, path: PathLike) -> None:
+        self.path = Path(path)
+
+    def __enter__(self) -> Self:
+        missing = [part for part in (self.path, *self.path.parents) if not part.exists()]
+        self._made = missing
+        prepare_folder(self.path)
+        try:
+            self._stage = tempfile.TemporaryDirectory(dir=self.path, prefix=".peakflight-")
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise InvalidFile(f"{self.path}: cannot be written to ({reason})") from None
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        staged = str(self.stage)
+        try:
+            if error is None or isinstance(error, Exception):
+                self._publish()
+        finally:
+            self._stage.cleanup()
+            self._remove_if_empty()
+        if isinstance(error, InvalidFile) and staged in str(error):
+            raise InvalidFile(str(error).replace(staged, str(self.path))) from None
+
+    @property
+    def stage(self) -> Path:
+        """Where files are written until all are complete."""
+        return Path(self._stage.name)
+
+    def published(self, name: str) -> Path:
+        """Where a file will be."""
+        return self.path / name
+
+    def _publish(self) -> None:
+        for staged in sorted(self.stage.iterdir()):
+            target = self.published(staged.name)
+            try:
+                os.replace(staged, target)
+            except OSError as error:
+                reason = (error.strerror or str(error)).lower()
+                raise InvalidFile(f"{target}: cannot be written ({reason})") from None
+
+    def _remove_if_empty(self) -> None:
+        """Remove folders that were made for nothing, the innermost first."""
+        for folder in self._made:
+            try:
+                folder.rmdir()
+            except OSError:
+                break
+
+
+def folder_for(course: str) -> Path:
+    """Where the plan of a course goes unless the user says otherwise: in the current folder."""
+    name = _ODD.sub("-", course).strip("-.")[:LONGEST_NAME]
+    return Path(f"{name or 'course'}-plan")

@@ -1,0 +1,100 @@
+"""Options that several commands share, and how limits are written on the command line."""
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from peakflight.errors import InvalidProblem
+from peakflight.limits import KINDS, LimitKind, Limits
+
+PAPER_LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+"""What the paper's experiments keep, and what counts where no limits are given."""
+LIMITS_EXAMPLE = ",".join(f"{name}={value:g}" for name, value in PAPER_LIMITS.to_dict().items())
+LONGEST_QUOTE = 40
+"""Characters of a wrong value that a message shows."""
+
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def parse_limits(text: str) -> Limits:
+    """Limits from `speed=5,tilt=50deg`, in SI units, angles in degrees if they say so.
+
+    Raises
+    ------
+    InvalidProblem
+        If an item is not name=value, a name is unknown or given twice, a value is not a number,
+        or the limits are against their own rules.
+    """
+    kinds = {kind.name: kind for kind in KINDS}
+    values: dict[str, float] = {}
+    for item in text.split(","):
+        name, mark, value = (part.strip() for part in item.partition("="))
+        if not (name and mark and value):
+            raise InvalidProblem(
+                f"{_shown(item.strip())} is not a limit; write name=value, such as speed=5"
+            )
+        if name not in kinds:
+            raise InvalidProblem(f"unknown limit {_shown(name)}; known are {', '.join(kinds)}")
+        if name in values:
+            raise InvalidProblem(f"limit {name} is given twice")
+        values[name] = _number(kinds[name], value)
+    return Limits.from_dict(values)
+
+
+def limits_option(help: str) -> Callable[[_Command], _Command]:
+    """Option `--limits` of a command; it may be repeated, and is None if not given."""
+    return click.option(
+        "--limits",
+        multiple=True,
+        metavar="NAME=VALUE,...",
+        callback=_limits,
+        help=f"{help} Names: {', '.join(kind.name for kind in KINDS)}. SI units; tilt=50deg works "
+        "too. Kinds that are not named do not limit.",
+    )
+
+
+def common_options(command: _Command) -> _Command:
+    """Options that every command has."""
+    for decorate in (
+        click.option(
+            "--debug",
+            is_flag=True,
+            expose_value=False,
+            help="Show where an unexpected error happened.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead."),
+    ):
+        command = decorate(command)
+    return command
+
+
+def _limits(
+    context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
+) -> Limits | None:
+    if not texts:
+        return None
+    try:
+        return parse_limits(",".join(texts))
+    except InvalidProblem as error:
+        raise click.BadParameter(str(error), context, parameter) from None
+
+
+def _number(kind: LimitKind, text: str) -> float:
+    is_angle = kind.unit == "rad"
+    in_degrees = is_angle and text.endswith("deg")
+    try:
+        if "_" in text:
+            raise ValueError
+        number = float(text.removesuffix("deg") if in_degrees else text)
+    except ValueError:
+        also = ", or degrees such as 50deg" if is_angle else ""
+        raise InvalidProblem(
+            f"limit {kind.name} is {_shown(text)}; it must be a number, in {kind.unit}{also}"
+        ) from None
+    return math.radians(number) if in_degrees else number
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}...")
