@@ -45,12 +45,13 @@ class Call:
         _loop(self.kernel)(count, *self.restored, *self.originals, self.arguments)
 
 
-def recorded(call: Callable[[], Any]) -> list[Call]:
+def recorded(call: Callable[[], Any], *, warm: bool = True) -> list[Call]:
     """The calls of kernels that a Python function makes, in their order.
 
-    The function runs twice: first to have all kernels compiled.
+    With `warm` the function first runs once more, to have all kernels compiled.
     """
-    call()
+    if warm:
+        call()
     calls: list[Call] = []
     with _spies(calls):
         call()
@@ -133,7 +134,7 @@ def _spy(calls: list[Call], name: str, kernel: Dispatcher) -> Callable[..., Any]
 @lru_cache
 def _loop(kernel: Dispatcher) -> Dispatcher:
     @njit
-    def loop(count, times, coefficients, first_times, first_coefficients, arguments):  # type: ignore[no-untyped-def]  # noqa: ANN
+    def loop(count, times, coefficients, first_times, first_coefficients, arguments):
         for _ in range(count):
             times[:] = first_times
             coefficients[:] = first_coefficients

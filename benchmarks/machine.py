@@ -39,7 +39,7 @@ class Machine:
 
 
 def describe() -> Machine:
-    """This machine, now."""
+    """What this machine is, now."""
     return Machine(
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         processor=_processor(),

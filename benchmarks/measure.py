@@ -1,8 +1,10 @@
 """CPU time of one thread, warm, as a median over rounds."""
 
+import gc
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 BATCH = 0.02
@@ -37,11 +39,6 @@ def ratio(one: Sample, other: Sample) -> float:
     return statistics.median(a / b for a, b in pairs)
 
 
-def cpu_time(call: Callable[[], object], rounds: int) -> Sample:
-    """CPU time of a call that is repeated from Python."""
-    return side_by_side([repeated(call)], rounds)[0]
-
-
 def repeated(call: Callable[[], object]) -> Callable[[int], object]:
     """A contender that repeats a Python call."""
 
@@ -59,10 +56,11 @@ def side_by_side(contenders: Sequence[Callable[[int], object]], rounds: int) -> 
     """
     counts = [_batch_size(contender) for contender in contenders]
     found: list[list[float]] = [[] for _ in contenders]
-    for _ in range(rounds):
-        for index, (contender, count) in enumerate(zip(contenders, counts, strict=True)):
-            if len(found[index]) < 2 or sum(found[index]) * count < BUDGET:
-                found[index].append(_time(contender, count) / count)
+    with _no_collection():
+        for _ in range(rounds):
+            for times, contender, count in zip(found, contenders, counts, strict=True):
+                if len(times) < 2 or sum(times) * count < BUDGET:
+                    times.append(_time(contender, count) / count)
     return [Sample(tuple(times)) for times in found]
 
 
@@ -81,3 +79,14 @@ def _time(contender: Callable[[int], object], count: int) -> float:
     began = time.thread_time()
     contender(count)
     return time.thread_time() - began
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Keep the garbage collector out, as `timeit` does."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

@@ -21,7 +21,7 @@ NO_LIMIT = 1e3
 
 COLUMNS: list[Column] = [
     ("who", ""), ("spline", ""), ("legs", "d"), ("time a solve [us]", ".4g"), ("spread", ".1%"),
-    ("times our core", ".3g"), ("times our function", ".3g"), ("furthest from our path [m]", ".1e"),
+    ("/ our core", ".3g"), ("/ our function", ".3g"), ("furthest from our path [m]", ".1e"),
 ]  # fmt: skip
 
 Solve = Callable[[], Any]
@@ -68,7 +68,7 @@ def _compare(legs: int, minimize: str, degree: int, rounds: int, *, skip_slow: b
         try:
             solve, follow = peer.prepare(waypoints, times)
             distance = _distance(follow, solve(), ours(), times)
-        except Exception as error:  # noqa: BLE001 - a failure is a row
+        except Exception as error:  # a failure is a row
             failures.append(failure({"who": peer.name, **what}, error))
             continue
         ready.append((peer, solve, distance))
@@ -97,8 +97,8 @@ def _row(
             **what,
             "time a solve [us]": 1e6 * sample.median,
             "spread": sample.spread,
-            "times our core": ratio(sample, inside),
-            "times our function": ratio(sample, outside),
+            "/ our core": ratio(sample, inside),
+            "/ our function": ratio(sample, outside),
             "furthest from our path [m]": distance,
         }
     )

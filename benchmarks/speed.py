@@ -1,6 +1,5 @@
 """How long the parts of a plan take: CPU time of one thread, warm."""
 
-import statistics
 from collections.abc import Callable
 
 import numpy as np
@@ -8,12 +7,18 @@ import numpy as np
 import peakflight as pf
 from benchmarks.compiled import Call, by_name, recorded, together
 from benchmarks.courses import JERK, SNAP, Task, even_times, sized
-from benchmarks.measure import Sample, cpu_time, repeated, side_by_side
+from benchmarks.measure import Sample, repeated, side_by_side
 from benchmarks.report import Cell, Column, Row, Table, failure, judged
 from benchmarks.scope import Scope
 
 SOLVE_BARS = {10: 0.5e-6, 100: 4e-6, 10_000: 1e-3}
 """Legs to CPU seconds of one minimum-jerk solve."""
+SOLVED: tuple[tuple[str, str, int, dict[int, float]], ...] = (
+    ("min jerk, degree 5", "jerk", 5, SOLVE_BARS),
+    ("min snap, degree 7", "snap", 7, {}),
+    ("min snap, degree 5, C3", "snap", 5, {}),
+)
+"""Name, cost, degree and bars of the splines at fixed times."""
 PEAK_BARS = {10: 1e-3, 100: 12e-3, 1_000: 200e-3}
 """Legs to CPU seconds of the optimiser and the stretch."""
 CERTIFY_BAR = 4e-6
@@ -43,13 +48,8 @@ def run(scope: Scope) -> list[Table]:
 
 
 def _solves(scope: Scope, rounds: int) -> Table:
-    kinds = (
-        ("min jerk, degree 5", "jerk", 5, SOLVE_BARS),
-        ("min snap, degree 7", "snap", 7, {}),
-        ("min snap, degree 5, C3", "snap", 5, {}),
-    )
     rows = []
-    for name, minimize, degree, bars in kinds:
+    for name, minimize, degree, bars in SOLVED[:2] if scope.quick else SOLVED:
         for legs in (10, 100) if scope.quick else (10, 100, 1_000, 10_000):
             label, waypoints = sized(legs)
             cells: dict[str, Cell] = {"what": name, "course": label, "legs": legs}
@@ -57,7 +57,7 @@ def _solves(scope: Scope, rounds: int) -> Table:
             try:
                 calls = recorded(spline_call(waypoints, minimize, degree))
                 sample = side_by_side([together(solves(calls))], rounds)[0]
-            except Exception as error:  # noqa: BLE001 - a failure is a row
+            except Exception as error:  # a failure is a row
                 rows.append(failure(cells, error, _at_most(bar)))
                 continue
             rows.append(_row(cells, sample, legs, bar))
@@ -88,19 +88,19 @@ def _plans(scope: Scope, rounds: int) -> tuple[Table, Table]:
     for task in (JERK, SNAP):
         per_leg: dict[int, float] = {}
         for legs in sizes:
-            if task is SNAP and legs > 1_000:
+            if task is SNAP and (scope.quick or legs > 1_000):
                 continue
             label, waypoints = sized(legs)
             cells: dict[str, Cell] = {"course": label, "legs": legs}
             try:
                 problem = task.problem(waypoints)
                 call = _plan_call(problem)
-                calls = recorded(call)
+                calls = recorded(call, warm=legs <= REPLAYED)
                 if legs <= REPLAYED:
                     new = _replayed(task, cells, calls, call, rounds, shares)
                 else:
                     new = _as_called(task, cells, calls, call, rounds=scope.pick(1, 2))
-            except Exception as error:  # noqa: BLE001 - a failure is a row
+            except Exception as error:  # a failure is a row
                 bar = _at_most(PEAK_BARS.get(legs)) if task is JERK else ""
                 what = f"peak, {task.name}: optimiser and stretch"
                 rows.append(failure({"what": what, **cells}, error, bar))
@@ -134,7 +134,14 @@ def _replayed(
 ) -> list[Row]:
     """Rows of one course: optimiser and stretch, the certificate, Python; and all the shares."""
     legs = int(cells["legs"] or 0)
-    whole, *parts = side_by_side([repeated(call), *(part.repeat for part in calls)], rounds)
+    called: list[float] = []
+
+    def spied(count: int) -> None:
+        runs = (recorded(call, warm=False) for _ in range(count))
+        called.extend(sum(part.seconds for part in run) for run in runs)
+
+    replays = (part.repeat for part in calls)
+    whole, _, *parts = side_by_side([repeated(call), spied, *replays], rounds)
     solver = by_name(calls, "descent.descend", "bounds.stretch")
     optimiser = _sum([parts[calls.index(part)] for part in solver])
     certificate = parts[calls.index(by_name(calls, "bounds.certify")[-1])]
@@ -157,26 +164,36 @@ def _replayed(
             python, legs, PYTHON_BAR if jerk and legs == 10 else None,
         ),
     ]  # fmt: skip
-    named: dict[str, list[Sample]] = {}
-    for part, sample in zip(calls, parts, strict=True):
-        named.setdefault(part.name, []).append(sample)
-    named["Python, conversion of arguments included"] = [python]
-    for name, samples in named.items():
-        seconds = sum(sample.median for sample in samples)
-        shares.append(
-            Row(
-                cells={
-                    "spline": task.name,
-                    "legs": legs,
-                    "part": name,
-                    "calls": len(samples),
-                    "CPU time": _in_words(seconds),
-                    "seconds": seconds,
-                    "share": seconds / whole.median,
-                }
-            )
-        )
+    shares += _shares(task.name, legs, calls, parts, whole, Sample(tuple(called)))
     return rows
+
+
+def _shares(
+    spline: str, legs: int, calls: list[Call], parts: list[Sample], whole: Sample, called: Sample
+) -> list[Row]:
+    """A row for each kernel, and what is left in two; `called`: kernels as Python calls them."""
+    named: dict[str, list[float]] = {}
+    for part, sample in zip(calls, parts, strict=True):
+        named.setdefault(part.name, []).append(sample.median)
+    replayed = sum(sample.median for sample in parts)
+    named["between Python and kernels: conversion of arguments, cold caches"] = [
+        called.median - replayed
+    ]
+    named["Python itself"] = [whole.median - called.median]
+    return [
+        Row(
+            cells={
+                "spline": spline,
+                "legs": legs,
+                "part": name,
+                "calls": len(times),
+                "CPU time": _in_words(sum(times)),
+                "seconds": sum(times),
+                "share": sum(times) / whole.median,
+            }
+        )
+        for name, times in named.items()
+    ]
 
 
 def _as_called(
@@ -186,7 +203,7 @@ def _as_called(
     legs = int(cells["legs"] or 0)
     runs = [calls]
     while len(runs) < rounds and sum(part.seconds for part in calls) < 10.0:
-        runs.append(recorded(call))
+        runs.append(recorded(call, warm=False))
     optimiser = Sample(
         tuple(
             sum(part.seconds for part in by_name(run, "descent.descend", "bounds.stretch"))
@@ -237,8 +254,3 @@ def _in_words(seconds: float) -> str:
     if size >= 1.0:
         return f"{seconds:.3g} s"
     return f"{1e3 * seconds:.4g} ms" if size >= 1e-3 else f"{1e6 * seconds:.4g} us"
-
-
-def median_of(values: list[float]) -> float:
-    """The median of a list."""
-    return statistics.median(values)

@@ -37,8 +37,15 @@ LIMITS = "speed=5,thrust_acceleration=15.5,jerk=62,snap=800"
 
 def run(scope: Scope) -> list[Table]:
     """One table; every process is fresh, and wall times are what the bars are about."""
-    rows = [*_imports(scope.pick(3, 7)), *_first_plan(), *_command(scope.pick(2, 5))]
-    text = "Fresh processes, byte code kept, files warm. CPU time is user and system time of all threads."
+    rows = [
+        *_imports(scope.pick(3, 7)),
+        *_first_plan(scope.pick(1, 3)),
+        *_command(scope.pick(2, 5)),
+    ]
+    text = (
+        "Fresh processes, byte code kept, files warm. CPU time is user and system time of all "
+        "threads."
+    )
     return [Table(title="Start-up", note=text, columns=COLUMNS, rows=rows)]
 
 
@@ -70,7 +77,7 @@ def _imports(count: int) -> list[Row]:
     return [judged(cells, "wall [s]", IMPORT_BAR, bar), check]
 
 
-def _first_plan() -> list[Row]:
+def _first_plan(again: int) -> list[Row]:
     rows = []
     code = FIRST_PLAN.format(course=str(FOLDER / "random_10.json"))
     what: dict[str, Cell] = {
@@ -81,7 +88,7 @@ def _first_plan() -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         try:
             first = python(["-c", code], NUMBA_CACHE_DIR=folder)
-            second = [python(["-c", code], NUMBA_CACHE_DIR=folder) for _ in range(3)]
+            second = [python(["-c", code], NUMBA_CACHE_DIR=folder) for _ in range(again)]
         except ProcessFailed as error:
             return [failure(what, error, bar)]
         size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())

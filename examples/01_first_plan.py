@@ -14,7 +14,8 @@ for leg, (seconds, limit) in enumerate(zip(plan.segment_times, plan.report.bindi
     print(f"leg {leg}: {seconds:.3f} s, closest to its limit: {limit}")
 
 position = plan.trajectory(0.5)
-thrust = plan.trajectory(0.5, derivative=2) + [0, 0, pf.GRAVITY]
+thrust = plan.trajectory(0.5, derivative=2)
+thrust[2] += pf.GRAVITY
 print("after half a second:", position.round(3), "thrust acceleration:", thrust.round(2))
 
 with tempfile.TemporaryDirectory() as folder:

@@ -164,8 +164,8 @@ def _exceeded(peaks: dict[str, np.ndarray], limits: Limits) -> list[str]:
     lines = []
     for kind in limits.active:
         kappa = peaks[kind.name]
-        segment = int(np.argmax(np.where(np.isnan(kappa), np.inf, kappa)))
-        if not kappa[segment] <= 1.0:
+        if not kappa.max() <= 1.0:  # NaN counts as exceeded
+            segment = int(np.argmax(kappa))
             lines.append(
                 f"{kind.label} reaches {kappa[segment]:.6g} times its limit of "
                 f"{getattr(limits, kind.name):g} {kind.unit} in segment {segment}"

@@ -107,6 +107,8 @@ def _tidied(
 
 def _contradiction(problem: Problem) -> str:
     """Which fixed motion exceeds a limit by itself, in words; empty if none does."""
+    if problem.is_at_rest:
+        return ""
     for index, state in problem.fixed.items():
         known = np.isfinite(state).all(axis=1)
         complete = state[: len(state) if known.all() else int(known.argmin())]

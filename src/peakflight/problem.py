@@ -168,9 +168,12 @@ class Problem:
     @cached_property
     def is_scalable(self) -> bool:
         """Whether slowing down keeps the path: one-derivative cost, no fixed motion but rest."""
-        return self.spline_class.is_homogeneous and not any(
-            np.nan_to_num(state).any() for state in self.fixed.values()
-        )
+        return self.spline_class.is_homogeneous and self.is_at_rest
+
+    @cached_property
+    def is_at_rest(self) -> bool:
+        """Whether every derivative that is fixed is zero."""
+        return not any((np.abs(state) > 0.0).any() for state in self.fixed.values())
 
     @property
     def guaranteed_continuity(self) -> int:

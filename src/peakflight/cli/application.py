@@ -16,6 +16,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -67,7 +68,7 @@ class Application(click.Group):
             raise _Interrupted from None
 
 
-class _Interrupted(Exception):  # noqa: N818
+class _Interrupted(Exception):
     """Ctrl-C."""
 
 
@@ -97,10 +98,11 @@ application.add_command(check)
 
 def _report(error: Exception, arguments: Sequence[str]) -> int:
     """Say what went wrong in one line, and how the process should end."""
-    command, code = "peakflight", BAD_INPUT
+    code = BAD_INPUT
     if isinstance(error, click.UsageError):
-        command = error.ctx.command_path if error.ctx else command
-        message = f"{error.format_message().rstrip('.')} (see {command} --help)"
+        command = error.ctx.command_path if error.ctx else "peakflight"
+        text = error.format_message().rstrip(".")
+        message = f"{text[:1].lower()}{text[1:]} (see {command} --help)"
     elif isinstance(error, click.ClickException):
         message = error.format_message()
     elif isinstance(error, PeakflightError):
@@ -114,7 +116,7 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
         if "--debug" in arguments or os.environ.get(DEBUG, "0") not in ("", "0"):
             traceback.print_exception(error)
     message = " ".join(message.split())
-    click.echo(f"{command}: {message}", err=True)
+    click.echo(f"peakflight: {message}", err=True)
     if "--json" in arguments:
         print_json({"error": message})
     return code
@@ -122,7 +124,5 @@ def _report(error: Exception, arguments: Sequence[str]) -> int:
 
 def _discard_output() -> None:
     """Let the interpreter flush into nothing when it ends."""
-    try:
+    with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except (OSError, ValueError):
-        pass

@@ -1,8 +1,8 @@
 """The folder that a command fills: all of its files together, or none."""
 
-import os
 import re
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -34,14 +34,18 @@ class OutputFolder:
         self.path = Path(path)
 
     def __enter__(self) -> Self:
-        missing = [part for part in (self.path, *self.path.parents) if not part.exists()]
-        self._made = missing
-        prepare_folder(self.path)
+        self._made: list[Path] = []
+        folders = (self.path, *self.path.parents)
         try:
+            self._made = [folder for folder in folders if not folder.exists()]
+            prepare_folder(self.path)
             self._stage = tempfile.TemporaryDirectory(dir=self.path, prefix=".peakflight-")
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise InvalidFile(f"{self.path}: cannot be written to ({reason})") from None
+            self._remove_if_empty()
+            raise InvalidFile(f"{self.path}: cannot be written to ({_reason(error)})") from None
+        except BaseException:
+            self._remove_if_empty()
+            raise
         return self
 
     def __exit__(
@@ -73,21 +77,22 @@ class OutputFolder:
         for staged in sorted(self.stage.iterdir()):
             target = self.published(staged.name)
             try:
-                os.replace(staged, target)
+                staged.replace(target)
             except OSError as error:
-                reason = (error.strerror or str(error)).lower()
-                raise InvalidFile(f"{target}: cannot be written ({reason})") from None
+                raise InvalidFile(f"{target}: cannot be written ({_reason(error)})") from None
 
     def _remove_if_empty(self) -> None:
         """Remove folders that were made for nothing, the innermost first."""
         for folder in self._made:
-            try:
+            with suppress(OSError):
                 folder.rmdir()
-            except OSError:
-                break
 
 
 def folder_for(course: str) -> Path:
     """Where the plan of a course goes unless the user says otherwise: in the current folder."""
     name = _ODD.sub("-", course).strip("-.")[:LONGEST_NAME]
     return Path(f"{name or 'course'}-plan")
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

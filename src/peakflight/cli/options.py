@@ -11,7 +11,6 @@ from peakflight.limits import KINDS, LimitKind, Limits
 
 PAPER_LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
 """What the paper's experiments keep, and what counts where no limits are given."""
-LIMITS_EXAMPLE = ",".join(f"{name}={value:g}" for name, value in PAPER_LIMITS.to_dict().items())
 LONGEST_QUOTE = 40
 """Characters of a wrong value that a message shows."""
 
@@ -43,15 +42,32 @@ def parse_limits(text: str) -> Limits:
     return Limits.from_dict(values)
 
 
-def limits_option(help: str) -> Callable[[_Command], _Command]:
-    """Option `--limits` of a command; it may be repeated, and is None if not given."""
+def written(limits: Limits, separator: str = ",") -> str:
+    """Limits as `parse_limits` reads them."""
+    items = []
+    for kind in limits.active:
+        value = getattr(limits, kind.name)
+        number = f"{math.degrees(value):.10g}deg" if kind.unit == "rad" else f"{value:.10g}"
+        items.append(f"{kind.name}={number}")
+    return separator.join(items)
+
+
+def limits_option(help: str, default: Limits | None = None) -> Callable[[_Command], _Command]:
+    """Option `--limits` of a command; it may be repeated, and is None if not given.
+
+    Parameters
+    ----------
+    default
+        What the command takes then, for the help text.
+    """
+    otherwise = "those in the file" if default is None else f"the paper's {written(default, ', ')}"
     return click.option(
         "--limits",
         multiple=True,
         metavar="NAME=VALUE,...",
         callback=_limits,
-        help=f"{help} Names: {', '.join(kind.name for kind in KINDS)}. SI units; tilt=50deg works "
-        "too. Kinds that are not named do not limit.",
+        help=f"{help} Known: {', '.join(kind.name for kind in KINDS)}; in SI units, angles also as "
+        f"50deg. What is not named is not limited. Default: {otherwise}.",
     )
 
 

@@ -23,7 +23,7 @@ from peakflight.figures.canvas import (
     write_headline,
     write_note,
 )
-from peakflight.limits import GRAVITY, KINDS, LimitKind
+from peakflight.limits import KINDS, LimitKind, limited_values
 from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 
@@ -58,7 +58,7 @@ def derivatives_figure(plan: Plan) -> Figure:
     """
     trajectory, limits = plan.trajectory, plan.problem.limits
     count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
-    curves = limited_values(trajectory, count)
+    curves = sampled_values(trajectory, count)
     local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
     times = trajectory.breakpoints[:-1, None] + local
     shown = [
@@ -84,23 +84,14 @@ def derivatives_figure(plan: Plan) -> Figure:
     return figure
 
 
-def limited_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
+def sampled_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
     """Name of limit to (K, count): what it limits, at even points of each piece.
 
     In the unit of the limit, but tilt in degrees.
     """
-    velocity, acceleration, jerk, snap = (trajectory.sample(count, order) for order in (1, 2, 3, 4))
-    thrust = acceleration + np.array([0.0, 0.0, GRAVITY])
-    size = np.linalg.norm(thrust, axis=-1)
-    across = np.hypot(thrust[..., 0], thrust[..., 1])
-    return {
-        "speed": np.linalg.norm(velocity, axis=-1),
-        "thrust_acceleration": size,
-        "jerk": np.linalg.norm(jerk, axis=-1),
-        "snap": np.linalg.norm(snap, axis=-1),
-        "tilt": np.degrees(np.arctan2(across, thrust[..., 2])),
-        "least_thrust_acceleration": size,
-    }
+    values = limited_values([trajectory.sample(count, order) for order in (1, 2, 3, 4)])
+    values["tilt"] = np.degrees(values["tilt"])
+    return values
 
 
 def _draw_panel(

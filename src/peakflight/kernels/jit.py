@@ -74,13 +74,14 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
 
     `name` tells one set of kernels from others; a mark beside the cache remembers it.
     """
+    if name in _ready or _config.DISABLE_JIT:
+        yield
+        return
     mark = Path(FOLDER) / f"{name}.ready"
-    known = name in _ready or mark.exists() or _config.DISABLE_JIT
-    if not known:
+    if not mark.exists():
         log.warning("compiling the planner for this machine, once; this takes some seconds")
     yield
-    if not known:
-        mark.touch()
+    mark.touch()
     _ready.add(name)
 
 

@@ -8,6 +8,7 @@ leads to up to limits that are hard in all but name; the exact stretch does the 
 """
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -71,7 +72,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         task.rows, (task.waypoints, task.simple, task.layered), times,
         problem.limits.as_array(), GRAVITY,
         tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
-        basis.sample_tables(degree, barrier.BATCH), _stages(settings), settings.memory,
+        basis.sample_tables(degree, barrier.BATCH), _stages(settings.ladder, settings.stage_iterations), settings.memory,
         barrier.workspace(count, degree), history,
     )  # fmt: skip
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT
@@ -85,15 +86,16 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     )
 
 
-def _stages(settings: Settings) -> np.ndarray:
+@lru_cache
+def _stages(ladder: tuple[Stage, ...], iterations: int) -> np.ndarray:
     """(n, 3) doublings of the power, most iterations, decrease."""
     rows = []
-    for index, (samples, power, decrease) in enumerate(settings.ladder):
+    for index, (samples, power, decrease) in enumerate(ladder):
         doublings = np.log2(power / barrier.BASE_POWER)
         if samples not in (8, 16, 32, 64) or doublings != round(doublings):
             raise InvalidProblem(
                 f"stage {index} of the ladder has {samples} samples and power {power}; they must "
                 "be 8, 16, 32 or 64 and 24 times a power of two"
             )
-        rows.append((doublings, settings.stage_iterations, decrease))
+        rows.append((doublings, iterations, decrease))
     return np.array(rows)

@@ -1,0 +1,125 @@
+"""What commands print: tables for people, one JSON object for machines."""
+
+import json
+import math
+import sys
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import click
+
+from peakflight.limits import LimitKind, Limits
+from peakflight.result import BINDING
+
+WIDEST = 100
+"""Columns that output takes at most, however wide the terminal."""
+UNBOUNDED = 1e8
+"""Ratios from here on stand for no bound at all, as for least thrust in free fall."""
+STYLES = {"good": "bold green", "bad": "bold red", "title": "bold", "plain": ""}
+
+
+class Printout:
+    """Lines and tables, gathered and then printed at once.
+
+    Colours are for terminals only; the tables read the same without them.
+    """
+
+    def __init__(self) -> None:
+        from rich.console import Console
+
+        self._console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
+        self._console.width = min(self._console.width, WIDEST)
+        self._console.begin_capture()
+
+    def line(self, text: str = "", style: str = "plain") -> None:
+        """Add a line of text, wrapped at words."""
+        self._console.print(text, style=STYLES[style])
+
+    def path(self, text: str) -> None:
+        """Add a line that is not to be wrapped."""
+        self._console.print(text, soft_wrap=True)
+
+    def pairs(self, rows: Iterable[tuple[str, str]]) -> None:
+        """Add names with what they are beside them."""
+        from rich.table import Table
+
+        table = Table.grid(padding=(0, 2))
+        for name, value in rows:
+            table.add_row(f"  {name}", value)
+        self._console.print(table)
+
+    def table(
+        self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str] | None]
+    ) -> None:
+        """Add a table; columns whose names begin with > are set to the right, None is a gap."""
+        from rich import box
+        from rich.table import Table
+
+        table = Table(
+            box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), header_style=STYLES["plain"]
+        )
+        for column in columns:
+            right = column.startswith(">")
+            table.add_column(
+                column.removeprefix(">"), justify="right" if right else "left", no_wrap=right
+            )
+        for row in rows:
+            cells = ["..."] * len(columns) if row is None else row
+            exceeded = row is not None and "exceeded" in row
+            table.add_row(*cells, style=STYLES["bad"] if exceeded else None)
+        self.line()
+        self.line(title, "title")
+        self._console.print(table)
+
+    def show(self) -> None:
+        """Print everything."""
+        lines = self._console.end_capture().split("\n")
+        click.echo("\n".join(line.rstrip(" ") for line in lines), nl=False)
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object on a line."""
+    click.echo(json.dumps(value, allow_nan=False))
+
+
+def number(kind: LimitKind, value: float) -> str:
+    """Print a value of a kind of limit; angles in degrees."""
+    return f"{math.degrees(value) if kind.unit == 'rad' else value:.6g}"
+
+
+def amount(kind: LimitKind, value: float) -> str:
+    """Print a value of a kind of limit with its unit; angles in degrees."""
+    return f"{number(kind, value)} {'deg' if kind.unit == 'rad' else kind.unit}"
+
+
+def attained(kind: LimitKind, limits: Limits, ratio: float) -> float | None:
+    """Value that a certified ratio stands for, in the unit of its kind; None where unbounded."""
+    limit: float = getattr(limits, kind.name)
+    if ratio >= UNBOUNDED:
+        return None
+    if kind.name.startswith("least_"):
+        return limit / ratio if ratio > 0.0 else None
+    return limit * ratio
+
+
+def ratio_cells(ratio: float) -> tuple[str, str, str]:
+    """A ratio to a limit, the distance to the limit, and what that means in a word."""
+    if ratio >= UNBOUNDED:
+        return "no bound", "", "exceeded"
+    if ratio > 1.0:
+        return f"{ratio:.6g}", f"{100.0 * (1.0 - ratio):.3g} %", "exceeded"
+    return f"{ratio:.4f}", f"{100.0 * (1.0 - ratio):.2f} %", "binds" if ratio >= BINDING else ""
+
+
+def ranges(numbers: Sequence[int], most: int = 8) -> str:
+    """Rising numbers as `0-3, 7`; of many parts the first, and how many numbers there are."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and number == parts[-1][1] + 1:
+            parts[-1][1] = number
+        else:
+            parts.append([number, number])
+    texts = [str(first) if first == last else f"{first}-{last}" for first, last in parts]
+    if len(texts) > most:
+        return f"{', '.join(texts[:most])}, ... ({len(numbers)} in all)"
+    return ", ".join(texts) or "none"

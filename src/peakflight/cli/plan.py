@@ -1,0 +1,204 @@
+"""`peakflight plan`: from a course file to a certified plan, flight files and pictures."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from peakflight.cli.folder import OutputFolder, folder_for
+from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option
+from peakflight.cli.output import print_json
+from peakflight.cli.plan_output import print_plan
+from peakflight.cli.progress import Progress
+from peakflight.course import Course, tidy
+from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
+from peakflight.formats import FLIGHT_WRITERS, read_course
+from peakflight.limits import Limits
+from peakflight.methods import METHODS
+from peakflight.problem import Problem
+from peakflight.result import Plan
+
+PLAN_FILE = "plan.json"
+PICTURES = {
+    "course": "the path, coloured by speed",
+    "derivatives": "what is limited, against time",
+    "segment_times": "times of the legs, by iteration",
+}
+"""Name without .png, and what it shows."""
+VARIANTS = ("descent", "paper")
+
+
+@click.command(short_help="Plan a course; write plan, flight files and pictures.")
+@click.argument("course", type=click.Path(path_type=Path))
+@click.option(
+    "--method",
+    type=click.Choice(tuple(METHODS)),
+    default="peak",
+    show_default=True,
+    help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items()) + ".",
+)
+@click.option(
+    "--variant",
+    type=click.Choice(VARIANTS),
+    help="Of method peak: descent, the default, or the paper's Algorithm 1.",
+)
+@limits_option("Limits to keep.", default=PAPER_LIMITS)
+@click.option(
+    "--minimize",
+    type=click.Choice(("jerk", "snap", "acceleration")),
+    default="jerk",
+    show_default=True,
+    help="Derivative whose square the spline minimizes.",
+)
+@click.option("--degree", type=int, help="Degree of the polynomials; by default the cost's own.")
+@click.option("--continuity", type=int, help="Highest derivative that is continuous.")
+@click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
+@click.option(
+    "--export",
+    "exports",
+    multiple=True,
+    type=click.Choice(tuple(FLIGHT_WRITERS)),
+    help="Flight file to write; may be repeated. By default all.",
+)
+@click.option("--no-figures", is_flag=True, help="Draw no pictures, which saves half a second.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder for the files; by default COURSE-plan, after the name of the course.",
+)
+@common_options
+def plan(
+    course: Path,
+    method: str,
+    variant: str | None,
+    limits: Limits | None,
+    minimize: str,
+    degree: int | None,
+    continuity: int | None,
+    strict: bool,
+    exports: tuple[str, ...],
+    no_figures: bool,
+    output: Path | None,
+    as_json: bool,
+) -> int:
+    """Plan the fastest trajectory through COURSE, a CSV, YAML or JSON file of waypoints.
+
+    Writes plan.json, the flight files and the pictures into a folder. Ends with 0 if the plan is
+    proven to keep every limit, 1 if there is no such plan, 2 if the input is wrong.
+
+    \b
+    Example:
+      peakflight plan course.csv --limits speed=5,jerk=62,tilt=50deg -o race
+    """  # noqa: D301
+    if variant is not None and method != "peak":
+        raise click.UsageError(f"--variant is of method peak; method {method} has none")
+    with Progress() as progress:
+        progress.stage("reading the course")
+        read, notes = _read(course, strict)
+        problem = Problem(
+            read.waypoints,
+            limits=limits or PAPER_LIMITS,
+            minimize=minimize,
+            degree=degree,
+            continuity=continuity,
+            yaw=read.yaw,
+        )
+        with OutputFolder(output or folder_for(read.name)) as folder:
+            progress.stage(f"planning {len(read)} waypoints by {method}")
+            answer = _solve(problem, method, variant)
+            if notes:
+                said = (*notes, answer.message) if answer.message else notes
+                answer = replace(answer, message="; ".join(said))
+            progress.stage("writing the files")
+            files, more = _write(answer, folder, exports)
+            if not no_figures:
+                progress.stage("drawing the pictures")
+                drawn, why_not = _draw(answer, folder)
+                files, more = {**files, **drawn}, (*more, *why_not)
+        if read.times is not None:
+            notes = (*notes, "the times in the course are not used: the planner finds its own")
+        stale = _stale(folder, files)
+        if stale:
+            more = (*more, f"from an earlier run in this folder: {', '.join(stale)}")
+    if as_json:
+        shown = {key: value for key, value in answer.to_dict().items() if key != "history"}
+        written = {name: str(path) for name, path in files.items()}
+        print_json({"course": read.name, **shown, "files": written, "notes": [*notes, *more]})
+    else:
+        print_plan(
+            answer,
+            course=read.name,
+            variant=variant,
+            default_limits=limits is None,
+            before=notes,
+            after=more,
+            folder=folder.path,
+            files=files,
+            summaries=_summaries(),
+        )
+    if not answer.feasible:
+        click.echo(f"peakflight: no feasible trajectory ({answer.status})", err=True)
+    return 0 if answer.feasible else 1
+
+
+def _read(path: Path, strict: bool) -> tuple[Course, tuple[str, ...]]:
+    course = read_course(path)
+    try:
+        return tidy(course, strict=strict)
+    except InvalidProblem as error:
+        raise InvalidFile(f"{path}: {error}") from None
+
+
+def _solve(problem: Problem, method: str, variant: str | None) -> Plan:
+    from peakflight.methods import find
+    from peakflight.planner import plan as solve
+
+    settings: Any = None if variant is None else find(method).Settings(variant=variant)
+    return solve(problem, method=method, settings=settings)
+
+
+def _write(
+    plan: Plan, folder: OutputFolder, exports: tuple[str, ...]
+) -> tuple[dict[str, Path], tuple[str, ...]]:
+    """Write the plan and, if it may be flown, its flight files; notes for whoever flies them."""
+    plan.save(folder.stage / PLAN_FILE)
+    files = {"plan": folder.published(PLAN_FILE)}
+    if not plan.feasible:
+        return files, ("no flight files: the plan is not proven to keep the limits",)
+    notes: list[str] = []
+    for name in exports or FLIGHT_WRITERS:
+        writer = FLIGHT_WRITERS[name]
+        try:
+            said = writer.write(plan, folder.stage / writer.filename)
+        except InvalidProblem as error:
+            notes.append(f"no {writer.filename}: {error}")
+            continue
+        notes += [f"{writer.filename}: {note}" for note in said]
+        files[name] = folder.published(writer.filename)
+    return files, tuple(notes)
+
+
+def _draw(plan: Plan, folder: OutputFolder) -> tuple[dict[str, Path], tuple[str, ...]]:
+    try:
+        from peakflight.figures import save_figures
+    except MissingExtra as error:
+        return {}, (f"no pictures: {error}",)
+    drawn = save_figures(plan, folder.stage)
+    return {path.stem: folder.published(path.name) for path in drawn}, ()
+
+
+def _stale(folder: OutputFolder, files: dict[str, Path]) -> list[str]:
+    """Files of an earlier plan that this one has not replaced."""
+    flight_files = [writer.filename for writer in FLIGHT_WRITERS.values()]
+    names = [*flight_files, *(f"{name}.png" for name in PICTURES)]
+    written = {path.name for path in files.values()}
+    return [name for name in names if name not in written and folder.published(name).exists()]
+
+
+def _summaries() -> dict[str, str]:
+    """What each file is, by the names of files."""
+    flight_files = {name: writer.summary for name, writer in FLIGHT_WRITERS.items()}
+    return {"plan": "the plan itself; peakflight check proves it", **flight_files, **PICTURES}

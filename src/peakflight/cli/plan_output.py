@@ -1,0 +1,120 @@
+"""What `peakflight plan` tells a person."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from peakflight.cli.options import written
+from peakflight.cli.output import Printout, amount, attained, number, ratio_cells
+from peakflight.limits import KINDS
+from peakflight.result import Plan
+
+MOST_LEGS = 40
+"""More legs than this are not all shown."""
+ENDS = 10
+"""Legs shown at either end where not all are."""
+MOST_NOTES = 10
+LABELS = {kind.name: kind.label for kind in KINDS}
+
+
+def print_plan(
+    plan: Plan,
+    *,
+    course: str,
+    variant: str | None,
+    default_limits: bool,
+    before: Sequence[str],
+    after: Sequence[str],
+    folder: Path,
+    files: Mapping[str, Path],
+    summaries: Mapping[str, str],
+) -> None:
+    """Print a plan and where its files are.
+
+    Parameters
+    ----------
+    before, after
+        Notes about the course and about the files.
+    files, summaries
+        Where each file is, and what it is.
+    """
+    out = Printout()
+    waypoints = len(plan.problem.waypoints)
+    out.line(f"{course}: {waypoints} waypoints, {waypoints - 1} legs", "title")
+    _print_notes(out, before)
+    source = " (the paper's)" if default_limits else ""
+    out.path(f"limits{source}: {written(plan.problem.limits)}")
+    out.line()
+    method = f"{plan.method}, variant {variant}" if variant else plan.method
+    proof = "yes, at every instant" if plan.feasible else "no"
+    out.pairs(
+        [
+            ("total time", f"{plan.duration:.4f} s"),
+            ("status", str(plan.status)),
+            ("certified", proof),
+            ("method", f"{method}; degree {plan.trajectory.degree}"),
+            ("planning time", f"{plan.wall_time_s:.3g} s"),
+            ("iterations", str(plan.iterations)),
+        ]
+    )
+    out.table("Legs", ("leg", ">time (s)", "closest limit", ">ratio", ">margin", ""), _legs(plan))
+    if len(plan.pieces) > MOST_LEGS:
+        shown = f"the first and last {ENDS} of {len(plan.pieces)} legs"
+        out.line(f"{shown}; plan.json has them all")
+    out.table(
+        "Limits",
+        ("limit", ">allowed", ">reached", ">ratio", ">margin", "", ">leg"),
+        _worst(plan),
+    )
+    if not plan.feasible:
+        out.line()
+        out.line(f"no feasible trajectory: {plan.message}", "bad")
+    out.line()
+    out.path(f"wrote to {folder}:")
+    out.pairs((path.name, summaries[name]) for name, path in files.items())
+    _print_notes(out, after)
+    out.show()
+
+
+def _print_notes(out: Printout, notes: Sequence[str]) -> None:
+    for note in notes[:MOST_NOTES]:
+        out.line(f"note: {note}")
+    if len(notes) > MOST_NOTES:
+        out.line(f"note: {len(notes) - MOST_NOTES} more like these; plan.json has them all")
+
+
+def _legs(plan: Plan) -> Iterator[Sequence[str] | None]:
+    """Each leg's time and the limit that binds it, or comes closest to."""
+    times = np.diff(plan.waypoint_times)
+    first = np.cumsum((0, *plan.pieces[:-1]))
+    names = list(plan.report.peaks)
+    kappa = np.array([np.maximum.reduceat(plan.report.peaks[name], first) for name in names])
+    closest = kappa.argmax(axis=0)
+    legs = len(times)
+    for leg in range(legs):
+        if legs > MOST_LEGS and ENDS <= leg < legs - ENDS:
+            if leg == ENDS:
+                yield None
+            continue
+        ratio, margin, meaning = ratio_cells(float(kappa[closest[leg], leg]))
+        name = LABELS[names[closest[leg]]]
+        yield str(leg), f"{times[leg]:.4f}", name, ratio, margin, meaning
+
+
+def _worst(plan: Plan) -> Iterator[Sequence[str]]:
+    """The worst ratio of each limit, and the leg where it is."""
+    limits = plan.problem.limits
+    legs = np.repeat(np.arange(len(plan.pieces)), plan.pieces)
+    for kind in limits.active:
+        kappa = plan.report.peaks[kind.name]
+        segment = int(kappa.argmax())
+        worst = float(kappa[segment])
+        reached = attained(kind, limits, worst)
+        yield (
+            kind.label,
+            amount(kind, getattr(limits, kind.name)),
+            "" if reached is None else number(kind, reached),
+            *ratio_cells(worst),
+            str(legs[segment]),
+        )
