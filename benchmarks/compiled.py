@@ -9,11 +9,12 @@ what a kernel works on in place is called `times` or `coefficients`.
 import inspect
 import pkgutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,11 @@ def recorded(call: Callable[[], Any], *, warm: bool = True) -> list[Call]:
     return calls
 
 
+def recorded_often(call: Callable[[], Any], count: int) -> list[list[Call]]:
+    """Several sets of the calls that a Python function makes, warm."""
+    return [recorded(call), *(recorded(call, warm=False) for _ in range(count - 1))]
+
+
 def by_name(calls: list[Call], *names: str) -> list[Call]:
     """The calls of some kernels, by `module.function`.
 
@@ -75,14 +81,18 @@ def by_name(calls: list[Call], *names: str) -> list[Call]:
     return found
 
 
-def together(calls: list[Call]) -> Callable[[int], None]:
-    """A contender for `measure` that replays several calls."""
+def replays(sets: Sequence[Sequence[Call]]) -> list[Callable[[int], None]]:
+    """Contenders for `measure`, one for each call of a set.
 
-    def repeat(count: int) -> None:
-        for call in calls:
-            call.repeat(count)
+    Several sets of the same calls take turns: where arrays lie in memory is worth some per cent,
+    and should not be that of one draw.
+    """
+    return [_in_turn(calls) for calls in zip(*sets, strict=True)]
 
-    return repeat
+
+def _in_turn(calls: Sequence[Call]) -> Callable[[int], None]:
+    turns = cycle(calls)
+    return lambda count: next(turns).repeat(count)
 
 
 @lru_cache

@@ -7,7 +7,7 @@ from unittest import mock
 import numpy as np
 
 import peakflight as pf
-from benchmarks.courses import JERK, SNAP, Task, course, names, unseen
+from benchmarks.courses import JERK, SNAP, Task, course, names, unseen, walk
 from benchmarks.report import Cell, Column, Row, Table, failure, judged
 from benchmarks.scope import Scope
 from peakflight.methods import peak
@@ -25,6 +25,8 @@ TIGHTER: tuple[peak.Stage, ...] = (
 )
 """The ladder of the reference: up to an eight times higher power, each stage run to its end."""
 TIGHTER_ITERATIONS = 2000
+SAME_START = "proportional"
+"""The start of `peak` itself."""
 PUSHES = (0.2, 0.6)
 """Standard deviations of log t in the random starts of the reference."""
 
@@ -38,16 +40,29 @@ UNSEEN_COLUMNS: list[Column] = [
     ("median gap [%]", ".4f"), ("max gap [%]", ".4f"), ("above the bar", "d"),
     ("mean iterations", ".0f"),
 ]  # fmt: skip
+LONG_COLUMNS: list[Column] = [
+    ("course", ""), ("legs", ",d"), ("peak [s]", ".2f"), ("s a leg", ".4f"),
+    ("less the last stage [s]", ".2f"), ("ratio", ".6f"),
+    ("median of the legs' peak ratios", ".4f"), ("certified", ""), ("status", ""),
+    ("iterations", "d"),
+]  # fmt: skip
 WORST_COLUMNS: list[Column] = [
     ("spline", ""), ("course", ""), ("legs", "d"), ("peak [s]", ".4f"), ("reference [s]", ".4f"),
-    ("gap [%]", ".4f"), ("reference from", ""), ("status", ""), ("iterations", "d"),
+    ("gap [%]", ".4f"), ("tighter, same start [%]", ".4f"),
+    ("reference from", ""), ("status", ""), ("iterations", "d"),
 ]  # fmt: skip
 
 
 def run(scope: Scope) -> list[Table]:
     """One table for each kind of spline on the known courses, two for the unseen ones."""
     tasks = (JERK,) if scope.quick else (JERK, SNAP)
-    return [*(_known(task) for task in tasks), *_unseen(tasks, scope.pick(10, 50))]
+    lengths = [1_000] if scope.quick else [1_000, 10_000, 30_000]
+    lengths += [100_000] if scope.full else []
+    return [
+        *(_known(task) for task in tasks),
+        *_unseen(tasks, scope.pick(10, 50)),
+        _long(lengths),
+    ]
 
 
 def _known(task: Task) -> Table:
@@ -89,6 +104,41 @@ def _known(task: Task) -> Table:
         columns=COURSE_COLUMNS,
         rows=rows,
     )
+
+
+def _long(lengths: Sequence[int]) -> Table:
+    """Long courses, where one leg that ends too fast slows down all others."""
+    # the last stage is replaced by the one before: as many stages, so nothing compiles again
+    early = (*peak.LADDER[:-1], peak.LADDER[-2])
+    rows = []
+    for legs in lengths:
+        cells: dict[str, Cell] = {"course": f"walk of {legs:,}", "legs": legs}
+        try:
+            problem = JERK.problem(walk(legs))
+            plan = pf.plan(problem)
+            other = pf.plan(problem, settings=peak.Settings(ladder=early))
+        except Exception as error:  # a failure is a row
+            rows.append(failure(cells, error, BAR))
+            continue
+        best = min(plan.duration, other.duration)
+        cells |= {
+            "peak [s]": plan.duration,
+            "s a leg": plan.duration / legs,
+            "less the last stage [s]": other.duration,
+            "ratio": plan.duration / best,
+            "median of the legs' peak ratios": float(np.median(plan.report.segment_peaks)),
+            "certified": plan.feasible,
+            "status": str(plan.status),
+            "iterations": plan.iterations,
+        }
+        row = judged(cells, "ratio", MOST, BAR)
+        row.met = bool(row.met and plan.feasible and plan.status is pf.Status.SOLVED)
+        rows.append(row)
+    text = (
+        "Random walks, min jerk. The ratio is to the better of `peak` and `peak` without the last "
+        "stage of its ladder. Where few legs come near a limit, a single one has slowed down all."
+    )
+    return Table(title="Long courses", note=text, columns=LONG_COLUMNS, rows=rows)
 
 
 def _unseen(tasks: Sequence[Task], count: int) -> list[Table]:
@@ -153,6 +203,8 @@ def _against_reference(task: Task, index: int) -> Row:
     }
     best, source = plan.duration, "default"
     for name, other in _references(problem, index):
+        if name == SAME_START:
+            cells["tighter, same start [%]"] = 100.0 * (plan.duration / other.duration - 1.0)
         if other.feasible and other.duration < best:
             best, source = other.duration, name
     cells |= {"reference [s]": best, "reference from": source}
@@ -168,7 +220,7 @@ def _references(problem: pf.Problem, index: int) -> Iterator[tuple[str, pf.Plan]
     rng = np.random.default_rng([index, 7])
     lengths = problem.leg_lengths
     starts = {
-        "tighter": lengths,
+        SAME_START: lengths,
         "roots of lengths": np.sqrt(lengths),
         "even times": np.ones(len(lengths)),
     }

@@ -28,9 +28,9 @@ class Sample:
     def spread(self) -> float:
         """Half the distance between the quartiles, relative to the median."""
         if len(self.rounds) < 3:
-            return (max(self.rounds) - min(self.rounds)) / 2.0 / self.median
+            return (max(self.rounds) - min(self.rounds)) / 2.0 / abs(self.median)
         low, _, high = statistics.quantiles(self.rounds, n=4, method="inclusive")
-        return (high - low) / 2.0 / self.median
+        return (high - low) / 2.0 / abs(self.median)
 
 
 def ratio(one: Sample, other: Sample) -> float:

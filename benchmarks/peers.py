@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import peakflight as pf
-from benchmarks.compiled import recorded, together
 from benchmarks.courses import even_times, sized
 from benchmarks.measure import Sample, ratio, repeated, side_by_side
 from benchmarks.report import Cell, Column, Row, Table, failure
 from benchmarks.scope import Scope
-from benchmarks.speed import solves, spline_call
+from benchmarks.speed import core_of, spline_call
 
 POINTS = 200
 """Where the path of a peer is compared with ours."""
@@ -55,7 +54,7 @@ def _compare(legs: int, minimize: str, degree: int, rounds: int, *, skip_slow: b
     _, waypoints = sized(legs)
     times = even_times(waypoints)
     ours = spline_call(waypoints, minimize, degree)
-    core = together(solves(recorded(ours)))
+    core = core_of(ours)
     what: dict[str, Cell] = {"spline": f"min {minimize}, degree {degree}", "legs": legs}
     failures: list[Row] = []
     ready: list[tuple[Peer, Solve, float]] = []

@@ -55,6 +55,14 @@ def failure(cells: dict[str, Cell], error: object, bar: str = "") -> Row:
     return Row(cells=cells, bar=bar, met=False if bar else None, note=f"failed: {_short(text)}")
 
 
+def in_words(seconds: float) -> str:
+    """A time with the unit that suits it."""
+    size = abs(seconds)
+    if size >= 1.0:
+        return f"{seconds:.3g} s"
+    return f"{1e3 * seconds:.4g} ms" if size >= 1e-3 else f"{1e6 * seconds:.4g} us"
+
+
 def as_markdown(table: Table) -> str:
     """A table with a verdict in each row."""
     keys = [key for key, _ in table.columns]

@@ -1,14 +1,15 @@
 """How long the parts of a plan take: CPU time of one thread, warm."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 import peakflight as pf
-from benchmarks.compiled import Call, by_name, recorded, together
+from benchmarks.compiled import Call, by_name, recorded, recorded_often, replays
 from benchmarks.courses import JERK, SNAP, Task, even_times, sized
 from benchmarks.measure import Sample, repeated, side_by_side
-from benchmarks.report import Cell, Column, Row, Table, failure, judged
+from benchmarks.report import Cell, Column, Row, Table, failure, in_words, judged
 from benchmarks.scope import Scope
 
 SOLVE_BARS = {10: 0.5e-6, 100: 4e-6, 10_000: 1e-3}
@@ -28,11 +29,13 @@ PYTHON_BAR = 0.3e-3
 LINEAR = 2.0
 """Most that a leg may cost more on the longest courses than at 1,000 legs."""
 REPLAYED = 2_000
-"""On longer courses the optimiser is timed as Python calls it: what that adds no longer counts."""
+"""On longer courses kernels are timed as Python calls them: what that adds no longer counts."""
+SETS = 5
+"""Sets of recorded calls that take turns."""
 
 COLUMNS: list[Column] = [
     ("what", ""), ("course", ""), ("legs", ",d"), ("CPU time", ""), ("us a leg", ".3f"),
-    ("spread", ".1%"),
+    ("spread", ".1%"), ("iterations", "d"),
 ]  # fmt: skip
 SHARE_COLUMNS: list[Column] = [
     ("spline", ""), ("legs", ",d"), ("part", ""), ("calls", "d"), ("CPU time", ""),
@@ -47,6 +50,18 @@ def run(scope: Scope) -> list[Table]:
     return [_solves(scope, rounds), table, shares]
 
 
+def spline_call(waypoints: np.ndarray, minimize: str, degree: int) -> Callable[[], pf.Trajectory]:
+    """The public call of a spline at times of an even speed."""
+    times = even_times(waypoints)
+    return lambda: pf.minimum_effort_spline(waypoints, times, minimize=minimize, degree=degree)
+
+
+def core_of(call: Callable[[], Any]) -> Callable[[int], None]:
+    """A contender: the kernel that solves a spline, out of its public call."""
+    sets = recorded_often(call, SETS)
+    return replays([by_name(calls, "classical.solve", "general.solve") for calls in sets])[0]
+
+
 def _solves(scope: Scope, rounds: int) -> Table:
     rows = []
     for name, minimize, degree, bars in SOLVED[:2] if scope.quick else SOLVED:
@@ -55,29 +70,18 @@ def _solves(scope: Scope, rounds: int) -> Table:
             cells: dict[str, Cell] = {"what": name, "course": label, "legs": legs}
             bar = bars.get(legs)
             try:
-                calls = recorded(spline_call(waypoints, minimize, degree))
-                sample = side_by_side([together(solves(calls))], rounds)[0]
+                core = core_of(spline_call(waypoints, minimize, degree))
+                sample = side_by_side([core], rounds)[0]
             except Exception as error:  # a failure is a row
                 rows.append(failure(cells, error, _at_most(bar)))
                 continue
-            rows.append(_row(cells, sample, legs, bar))
+            rows.append(_row(cells, sample, bar))
     return Table(
         title="One spline at fixed times, in a compiled loop",
         note="From waypoints and times to the derivatives at both ends of every piece, three axes.",
-        columns=COLUMNS,
+        columns=COLUMNS[:-1],
         rows=rows,
     )
-
-
-def spline_call(waypoints: np.ndarray, minimize: str, degree: int) -> Callable[[], pf.Trajectory]:
-    """The public call of a spline at times of an even speed."""
-    times = even_times(waypoints)
-    return lambda: pf.minimum_effort_spline(waypoints, times, minimize=minimize, degree=degree)
-
-
-def solves(calls: list[Call]) -> list[Call]:
-    """The calls that solve a spline."""
-    return by_name(calls, "classical.solve", "general.solve")
 
 
 def _plans(scope: Scope, rounds: int) -> tuple[Table, Table]:
@@ -85,34 +89,28 @@ def _plans(scope: Scope, rounds: int) -> tuple[Table, Table]:
     shares: list[Row] = []
     sizes = [10, 100] if scope.quick else [10, 100, 1_000, 10_000]
     sizes += [100_000] if scope.full else []
-    for task in (JERK, SNAP):
-        per_leg: dict[int, float] = {}
-        for legs in sizes:
-            if task is SNAP and (scope.quick or legs > 1_000):
-                continue
+    for task in (JERK,) if scope.quick else (JERK, SNAP):
+        first: Row | None = None
+        for legs in sizes if task is JERK else [size for size in sizes if size <= REPLAYED]:
             label, waypoints = sized(legs)
-            cells: dict[str, Cell] = {"course": label, "legs": legs}
+            course = _Course(task, legs, {"course": label, "legs": legs})
             try:
                 problem = task.problem(waypoints)
-                call = _plan_call(problem)
-                calls = recorded(call, warm=legs <= REPLAYED)
                 if legs <= REPLAYED:
-                    new = _replayed(task, cells, calls, call, rounds, shares)
+                    rows += (new := _replayed(course, problem, rounds, shares))
                 else:
-                    new = _as_called(task, cells, calls, call, rounds=scope.pick(1, 2))
+                    rows += (new := _as_called(course, problem, scope.pick(1, 3)))
             except Exception as error:  # a failure is a row
-                bar = _at_most(PEAK_BARS.get(legs)) if task is JERK else ""
-                what = f"peak, {task.name}: optimiser and stretch"
-                rows.append(failure({"what": what, **cells}, error, bar))
+                rows.append(failure(course.cells("optimiser and stretch"), error, course.peak_bar))
                 continue
-            per_leg[legs] = float(new[0].cells["us a leg"] or 0.0)
-            if legs > 1_000 and 1_000 in per_leg and new[0].met is None:
+            if legs == 1_000:
+                first = new[0]
+            if legs > 1_000 and first is not None:
                 new[0].bar = f"<= {LINEAR:g} x the one at 1,000"
-                new[0].met = per_leg[legs] <= LINEAR * per_leg[1_000]
-            rows += new
+                new[0].met = _per_leg(new[0]) <= LINEAR * _per_leg(first)
     text = (
-        "Compiled parts are replayed from a compiled loop with the arguments of a real plan "
-        "(beyond 1,000 legs: as they are called). Python is the plan less all compiled parts."
+        "Compiled parts are replayed from a compiled loop with the arguments of real plans "
+        "(beyond 1,000 legs: as Python calls them). Python is the plan less all compiled parts."
     )
     return (
         Table(title="A plan by `peak`", note=text, columns=COLUMNS, rows=rows),
@@ -120,89 +118,74 @@ def _plans(scope: Scope, rounds: int) -> tuple[Table, Table]:
     )
 
 
-def _plan_call(problem: pf.Problem) -> Callable[[], pf.Plan]:
-    return lambda: pf.plan(problem)
+class _Course:
+    """Which rows a course gets, and their bars."""
+
+    def __init__(self, task: Task, legs: int, about: dict[str, Cell]) -> None:
+        self.task, self.legs, self.about = task, legs, about
+        self.seconds = PEAK_BARS.get(legs) if task is JERK else None
+        self.peak_bar = _at_most(self.seconds)
+
+    def cells(self, what: str) -> dict[str, Cell]:
+        return {"what": f"{self.task.name}: {what}", **self.about}
+
+    def optimiser(self, sample: Sample, plan: pf.Plan) -> Row:
+        cells = {**self.cells("optimiser and stretch"), "iterations": plan.iterations}
+        row = _row(cells, sample, self.seconds)
+        if plan.status is not pf.Status.SOLVED:
+            row.note = f"status: {plan.status}"
+        return row
+
+    def certificate(self, sample: Sample) -> Row:
+        bar = CERTIFY_BAR * self.legs if self.task is JERK else None
+        words = f"<= {1e6 * CERTIFY_BAR:g} us a leg"
+        return _row(self.cells("certificate of four limits"), sample, bar, words)
+
+    def whole(self, sample: Sample) -> Row:
+        return _row(self.cells("pf.plan, all of it"), sample, None)
+
+    def python(self, sample: Sample) -> Row:
+        bar = PYTHON_BAR if self.task is JERK and self.legs == 10 else None
+        return _row(self.cells("pf.plan, less compiled parts"), sample, bar)
 
 
-def _replayed(
-    task: Task,
-    cells: dict[str, Cell],
-    calls: list[Call],
-    call: Callable[[], pf.Plan],
-    rounds: int,
-    shares: list[Row],
-) -> list[Row]:
+def _replayed(course: _Course, problem: pf.Problem, rounds: int, shares: list[Row]) -> list[Row]:
     """Rows of one course: optimiser and stretch, the certificate, Python; and all the shares."""
-    legs = int(cells["legs"] or 0)
+    plans: list[pf.Plan] = []
     called: list[float] = []
+
+    def call() -> None:
+        plans[:] = [pf.plan(problem)]
 
     def spied(count: int) -> None:
         runs = (recorded(call, warm=False) for _ in range(count))
         called.extend(sum(part.seconds for part in run) for run in runs)
 
-    replays = (part.repeat for part in calls)
-    whole, _, *parts = side_by_side([repeated(call), spied, *replays], rounds)
-    solver = by_name(calls, "descent.descend", "bounds.stretch")
-    optimiser = _sum([parts[calls.index(part)] for part in solver])
-    certificate = parts[calls.index(by_name(calls, "bounds.certify")[-1])]
+    sets = recorded_often(call, SETS)
+    calls = sets[0]
+    whole, _, *parts = side_by_side([repeated(call), spied, *replays(sets)], rounds)
     everything = _sum(parts)
     python = Sample(tuple(a - b for a, b in zip(whole.rounds, everything.rounds, strict=False)))
-    jerk = task is JERK
-    rows = [
-        _row(
-            {"what": f"peak, {task.name}: optimiser and stretch", **cells},
-            optimiser, legs, PEAK_BARS.get(legs) if jerk else None,
-        ),
-        _row(
-            {"what": f"certificate, {task.name}: four limits", **cells},
-            certificate, legs, CERTIFY_BAR * legs if jerk else None,
-            words=f"<= {CERTIFY_BAR * 1e6:g} us a leg",
-        ),
-        _row({"what": f"pf.plan, {task.name}: all of it", **cells}, whole, legs, None),
-        _row(
-            {"what": f"pf.plan, {task.name}: Python", **cells},
-            python, legs, PYTHON_BAR if jerk and legs == 10 else None,
-        ),
-    ]  # fmt: skip
-    shares += _shares(task.name, legs, calls, parts, whole, Sample(tuple(called)))
-    return rows
-
-
-def _shares(
-    spline: str, legs: int, calls: list[Call], parts: list[Sample], whole: Sample, called: Sample
-) -> list[Row]:
-    """A row for each kernel, and what is left in two; `called`: kernels as Python calls them."""
-    named: dict[str, list[float]] = {}
-    for part, sample in zip(calls, parts, strict=True):
-        named.setdefault(part.name, []).append(sample.median)
-    replayed = sum(sample.median for sample in parts)
-    named["between Python and kernels: conversion of arguments, cold caches"] = [
-        called.median - replayed
-    ]
-    named["Python itself"] = [whole.median - called.median]
+    shares += _shares(course, calls, parts, whole, Sample(tuple(called)))
+    solver = by_name(calls, "descent.descend", "bounds.stretch")
+    last = calls.index(by_name(calls, "bounds.certify")[-1])
     return [
-        Row(
-            cells={
-                "spline": spline,
-                "legs": legs,
-                "part": name,
-                "calls": len(times),
-                "CPU time": _in_words(sum(times)),
-                "seconds": sum(times),
-                "share": sum(times) / whole.median,
-            }
-        )
-        for name, times in named.items()
+        course.optimiser(_sum([parts[calls.index(part)] for part in solver]), plans[0]),
+        course.certificate(parts[last]),
+        course.whole(whole),
+        course.python(python),
     ]
 
 
-def _as_called(
-    task: Task, cells: dict[str, Cell], calls: list[Call], call: Callable[[], object], rounds: int
-) -> list[Row]:
+def _as_called(course: _Course, problem: pf.Problem, rounds: int) -> list[Row]:
     """Rows of a long course, each plan timed as it runs."""
-    legs = int(cells["legs"] or 0)
-    runs = [calls]
-    while len(runs) < rounds and sum(part.seconds for part in calls) < 10.0:
+    plans: list[pf.Plan] = []
+
+    def call() -> None:
+        plans[:] = [pf.plan(problem)]
+
+    runs: list[list[Call]] = []
+    while len(runs) < rounds and sum(part.seconds for run in runs for part in run) < 10.0:
         runs.append(recorded(call, warm=False))
     optimiser = Sample(
         tuple(
@@ -211,33 +194,52 @@ def _as_called(
         )
     )
     certificate = Sample(tuple(by_name(run, "bounds.certify")[-1].seconds for run in runs))
-    jerk = task is JERK
+    return [course.optimiser(optimiser, plans[0]), course.certificate(certificate)]
+
+
+def _shares(
+    course: _Course, calls: list[Call], parts: list[Sample], whole: Sample, called: Sample
+) -> list[Row]:
+    """A row for each kernel, and what is left in two; `called`: kernels as Python calls them."""
+    named: dict[str, list[float]] = {}
+    for part, sample in zip(calls, parts, strict=True):
+        named.setdefault(part.name, []).append(sample.median)
+    replayed = sum(sample.median for sample in parts)
+    named["between Python and kernels: conversion of arguments, cold memory"] = [
+        called.median - replayed
+    ]
+    named["Python itself"] = [whole.median - called.median]
     return [
-        _row(
-            {"what": f"peak, {task.name}: optimiser and stretch", **cells},
-            optimiser, legs, PEAK_BARS.get(legs) if jerk else None,
-        ),
-        _row(
-            {"what": f"certificate, {task.name}: four limits", **cells},
-            certificate, legs, CERTIFY_BAR * legs if jerk else None,
-            words=f"<= {CERTIFY_BAR * 1e6:g} us a leg",
-        ),
-    ]  # fmt: skip
+        Row(
+            cells={
+                "spline": course.task.name,
+                "legs": course.legs,
+                "part": name,
+                "calls": len(times),
+                "CPU time": in_words(sum(times)),
+                "seconds": sum(times),
+                "share": sum(times) / whole.median,
+            }
+        )
+        for name, times in named.items()
+    ]
 
 
-def _row(
-    cells: dict[str, Cell], sample: Sample, legs: int, bar: float | None, words: str = ""
-) -> Row:
+def _row(cells: dict[str, Cell], sample: Sample, bar: float | None, words: str = "") -> Row:
     cells = {
         **cells,
-        "CPU time": _in_words(sample.median),
+        "CPU time": in_words(sample.median),
         "seconds": sample.median,
-        "us a leg": 1e6 * sample.median / legs,
+        "us a leg": 1e6 * sample.median / int(cells["legs"] or 1),
         "spread": sample.spread,
     }
     if bar is None:
         return Row(cells=cells)
     return judged(cells, "seconds", bar, words or _at_most(bar))
+
+
+def _per_leg(row: Row) -> float:
+    return float(row.cells["us a leg"] or np.inf)
 
 
 def _sum(samples: list[Sample]) -> Sample:
@@ -246,11 +248,4 @@ def _sum(samples: list[Sample]) -> Sample:
 
 
 def _at_most(seconds: float | None) -> str:
-    return "" if seconds is None else f"<= {_in_words(seconds)}"
-
-
-def _in_words(seconds: float) -> str:
-    size = abs(seconds)
-    if size >= 1.0:
-        return f"{seconds:.3g} s"
-    return f"{1e3 * seconds:.4g} ms" if size >= 1e-3 else f"{1e6 * seconds:.4g} us"
+    return "" if seconds is None else f"<= {in_words(seconds)}"

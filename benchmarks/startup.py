@@ -1,12 +1,12 @@
 """How long it takes to begin: the import, the first plan of all, and a plan by command line."""
 
 import json
+import os
 import statistics
 import tempfile
 from pathlib import Path
 
-from benchmarks.courses import FOLDER
-from benchmarks.processes import ProcessFailed, median, python
+from benchmarks.processes import ROOT, ProcessFailed, median, python
 from benchmarks.report import Cell, Column, Row, Table, failure, judged
 from benchmarks.scope import Scope
 
@@ -32,6 +32,7 @@ limits = pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
 plan = pf.plan(course.waypoints, limits=limits)
 assert plan.feasible, plan.message
 """
+COURSE = str(ROOT / "examples" / "courses" / "random_10.json")
 LIMITS = "speed=5,thrust_acceleration=15.5,jerk=62,snap=800"
 
 
@@ -39,7 +40,7 @@ def run(scope: Scope) -> list[Table]:
     """One table; every process is fresh, and wall times are what the bars are about."""
     rows = [
         *_imports(scope.pick(3, 7)),
-        *_first_plan(scope.pick(1, 3)),
+        *_first_plan(scope),
         *_command(scope.pick(2, 5)),
     ]
     text = (
@@ -77,18 +78,19 @@ def _imports(count: int) -> list[Row]:
     return [judged(cells, "wall [s]", IMPORT_BAR, bar), check]
 
 
-def _first_plan(again: int) -> list[Row]:
+def _first_plan(scope: Scope) -> list[Row]:
     rows = []
-    code = FIRST_PLAN.format(course=str(FOLDER / "random_10.json"))
+    code = FIRST_PLAN.format(course=COURSE)
     what: dict[str, Cell] = {
         "what": "first plan ever (random_10, nothing compiled)",
         "processes": 1,
     }
     bar = f"<= {FIRST_BAR:g} s"
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as name:
+        folder = os.environ["NUMBA_CACHE_DIR"] if scope.quick else name  # empty so far
         try:
             first = python(["-c", code], NUMBA_CACHE_DIR=folder)
-            second = [python(["-c", code], NUMBA_CACHE_DIR=folder) for _ in range(again)]
+            second = [python(["-c", code], NUMBA_CACHE_DIR=folder) for _ in range(scope.pick(1, 3))]
         except ProcessFailed as error:
             return [failure(what, error, bar)]
         size = sum(f.stat().st_size for f in Path(folder).rglob("*") if f.is_file())
@@ -111,7 +113,7 @@ def _first_plan(again: int) -> list[Row]:
 def _command(count: int) -> list[Row]:
     what: dict[str, Cell] = {"what": "peakflight plan random_10, pictures included"}
     bar = f"<= {COMMAND_BAR} s"
-    course = str(FOLDER / "random_10.json")
+    course = COURSE
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         command = ["-m", "peakflight", "plan", course, "--limits", LIMITS, "-o", str(folder / "o")]

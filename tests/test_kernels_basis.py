@@ -35,9 +35,7 @@ def evaluate(coefficients, u):
 
 def integral_of_product(a, b):
     """Over [0, 1]."""
-    terms = [
-        (x * y, i + j + 1) for i, x in enumerate(a) for j, y in enumerate(b)
-    ]
+    terms = [(x * y, i + j + 1) for i, x in enumerate(a) for j, y in enumerate(b)]
     return sum((value / power for value, power in terms), Fraction(0))
 
 

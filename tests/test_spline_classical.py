@@ -47,7 +47,9 @@ def solve_exactly(matrix, right):
         for k in range(i + 1, size):
             if rows[k][i]:
                 factor = rows[k][i] / rows[i][i]
-                rows[k] = [a - factor * b if b else a for a, b in zip(rows[k], rows[i], strict=True)]
+                rows[k] = [
+                    a - factor * b if b else a for a, b in zip(rows[k], rows[i], strict=True)
+                ]
     solution = [None] * size
     for i in reversed(range(size)):
         known = [
@@ -292,11 +294,11 @@ def test_every_admissible_change_is_orthogonal_and_costs_more(degree):
 )
 def test_one_leg_from_rest_to_rest(degree, speed, acceleration):
     """Analytic: derivative of the regularised incomplete beta function."""
-    duration, offset = 1.7, np.array([1.0, -2.0, 2.0])
-    found = classical([[3.0, 0.0, 1.0], [3.0, 0.0, 1.0] + offset], [duration], degree)
+    duration, origin, offset = 1.7, np.array([3.0, 0.0, 1.0]), np.array([1.0, -2.0, 2.0])
+    found = classical([origin, origin + offset], [duration], degree)
     middle = found(duration / 2, 1)
     np.testing.assert_allclose(middle, speed * offset / duration, rtol=1e-13)
-    np.testing.assert_allclose(found(duration / 2), [3.0, 0.0, 1.0] + offset / 2, rtol=1e-14)
+    np.testing.assert_allclose(found(duration / 2), origin + offset / 2, rtol=1e-14)
     if acceleration is not None:
         t = np.linspace(0.0, duration, 200_001)
         peak = np.linalg.norm(found(t, 2), axis=1).max()

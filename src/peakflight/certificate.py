@@ -104,7 +104,7 @@ def certify_answer(
         problem.limits,
         waypoints=problem.waypoints,
         pieces=pieces,
-        continuity=problem.guaranteed_continuity,
+        continuity=problem.spline_class.continuity,
     )
 
 

@@ -63,6 +63,8 @@ class SplineClass(NamedTuple):
         minimize: str | Mapping[str | int, float] | Sequence[float] = "jerk",
         degree: int | None = None,
         continuity: int | None = None,
+        *,
+        inner: bool = False,
     ) -> Self:
         """Fill in what is not given and check that the three go together.
 
@@ -76,6 +78,9 @@ class SplineClass(NamedTuple):
         continuity
             By default what the optimum itself has, 2r-2, where the degree allows it; else
             degree - 2 (C3 for minimum snap at degree 5, as in the paper).
+        inner
+            Derivatives are fixed at inner waypoints. The optimum then has r-1 there, which is the
+            default, as far as the degree allows it.
         """
         weights = _weights(minimize)
         order = max(weights)
@@ -89,7 +94,8 @@ class SplineClass(NamedTuple):
                 f"minimize weighs derivative {order}, which is zero at degree {degree}"
             )
         if continuity is None:
-            continuity = 2 * order - 2 if degree >= 2 * order - 1 else degree - 2
+            natural = order - 1 if inner else 2 * order - 2
+            continuity = min(natural, degree - 2) if degree < 2 * order - 1 else natural
         continuity = _integer("continuity", continuity)
         if not 0 <= continuity < degree:
             raise InvalidProblem(
@@ -135,7 +141,9 @@ class Problem:
         object.__setattr__(self, "waypoints", waypoints)
         if not isinstance(self.limits, Limits):
             raise InvalidProblem(f"limits is {self.limits!r}; it must be a peakflight.Limits")
-        spline_class = SplineClass.of(self.minimize, self.degree, self.continuity)
+        spline_class = SplineClass.of(
+            self.minimize, self.degree, self.continuity, inner=bool(self.derivatives)
+        )
         object.__setattr__(self, "degree", spline_class.degree)
         object.__setattr__(self, "continuity", spline_class.continuity)
         if self.yaw is not None:
@@ -174,17 +182,6 @@ class Problem:
     def is_at_rest(self) -> bool:
         """Whether every derivative that is fixed is zero."""
         return not any((np.abs(state) > 0.0).any() for state in self.fixed.values())
-
-    @property
-    def guaranteed_continuity(self) -> int:
-        """Highest derivative that is sure not to jump at any waypoint.
-
-        A derivative that is fixed at an inner waypoint makes a higher one of a classical spline
-        jump there: what stays continuous is what the end data of two pieces share.
-        """
-        if self.spline_class.is_classical and self.derivatives:
-            return min(self.spline_class.continuity, self.spline_class.end_orders)
-        return self.spline_class.continuity
 
     @property
     def leg_lengths(self) -> np.ndarray:

@@ -4,6 +4,7 @@ The cost is quadratic in the coefficients and the constraints are linear, so the
 solution of a banded linear system: O(K) in time and memory, whatever the class of spline.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +21,10 @@ from peakflight.trajectory import Trajectory
 
 REFINEMENTS = 3
 """Solves of a general spline with one factorisation; more change nothing at double precision."""
+
+SINGULAR = 1e-9
+"""A pivot this small, at durations that are alike, means that there is not one optimum."""
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
 class Undetermined(InvalidProblem):
@@ -55,6 +60,11 @@ class SplineTask:
             Degree, cost and continuity.
         fixed
             Waypoint index to fixed derivatives (n, D) from velocity on; NaN where free.
+
+        Raises
+        ------
+        Undetermined
+            If there is not exactly one optimum.
         """
         count, axes = waypoints.shape
         degree = spline_class.degree
@@ -77,8 +87,9 @@ class SplineTask:
         for index, state in fixed.items():
             table[index, 1 : len(state) + 1] = state
         continuity = spline_class.continuity
-        if spline_class.is_classical:
-            continuity = b  # the optimum is smoother by itself, wherever nothing is fixed
+        inner = np.isfinite(table[1:-1, 1:]).any()
+        if spline_class.is_classical and not inner and not np.isfinite(table[:, b + 1 :]).any():
+            continuity = b  # the optimum is smoother by itself
         layout = make_layout(degree, continuity, table)
         patterns, _, slots = layout.free.shape
         size = count * slots
@@ -91,6 +102,18 @@ class SplineTask:
         starts = np.zeros((count - 1, axes))
         reference = _fill_free(waypoints)
         cost = make_cost(degree, spline_class.weights)
+        # Whether there is one optimum does not depend on times and weights, save by coincidence:
+        # ask where the matrix is well conditioned, and times are alike but in no pattern.
+        probe = 1.0 + 0.3 * (GOLDEN * np.arange(1.0, count) % 1.0)
+        pivot = general.factorise(
+            layout, cost._replace(weights=np.ones_like(cost.weights)), probe, factors
+        )
+        if not pivot > SINGULAR:
+            raise Undetermined(
+                f"the cost and what is fixed do not determine one trajectory (degree {degree}, "
+                f"continuity C{continuity}): fix less or more, weigh a lower derivative or raise "
+                "the degree"
+            )
         return cls(spline_class, reference, None, (layout, cost, factors, values, starts))
 
     @property
@@ -103,8 +126,8 @@ class SplineTask:
 
         Raises
         ------
-        Undetermined
-            If there is not exactly one optimum.
+        InvalidProblem
+            If the durations differ too much for double precision.
         """
         times = fresh(segment_times)
         count, axes = self.waypoints.shape
@@ -123,11 +146,9 @@ class SplineTask:
                 layout, cost, self.waypoints, times, REFINEMENTS, factors, values, data, starts
             )
             if code != 0 or not np.isfinite(data).all():
-                raise Undetermined(
-                    "the cost and what is fixed do not determine one trajectory "
-                    f"(degree {self.spline_class.degree}, continuity "
-                    f"C{self.spline_class.continuity}): fix less, weigh a lower derivative or "
-                    "raise the degree"
+                raise InvalidProblem(
+                    "the spline cannot be computed in double precision: durations differ too much "
+                    f"({times.min():g} to {times.max():g} s) for degree {self.spline_class.degree}"
                 )
         return Trajectory(coefficients_of(data, starts, times), times)
 
@@ -196,7 +217,7 @@ def minimum_effort_spline(
     if bad.any():
         index = int(bad.argmax())
         raise InvalidProblem(f"segment {index} lasts {times[index]} s; it must be positive")
-    spline_class = SplineClass.of(minimize, degree, continuity)
+    spline_class = SplineClass.of(minimize, degree, continuity, inner=bool(derivatives))
     axes, last = points.shape[1], len(points) - 1
     rest = spline_class.end_orders
     fixed = {

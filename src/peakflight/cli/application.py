@@ -43,10 +43,10 @@ class Application(click.Group):
         try:
             code = self.main(arguments, prog_name="peakflight", standalone_mode=False)
             sys.stdout.flush()
-        except _Interrupted:
+        except (_Interrupted, click.Abort):
             click.echo("peakflight: interrupted", err=True)
             return INTERRUPTED
-        except BrokenPipeError:
+        except (_PipeClosed, BrokenPipeError):
             _discard_output()
             return PIPE_CLOSED
         except Exception as error:
@@ -61,15 +61,21 @@ class Application(click.Group):
         return super().main(*args, **options)
 
     def invoke(self, context: click.Context) -> Any:
-        """Run the command; click itself would call Ctrl-C an abort, in two lines."""
+        """Run the command, and keep from click what it would end in other words and codes."""
         try:
             return super().invoke(context)
         except KeyboardInterrupt:
             raise _Interrupted from None
+        except BrokenPipeError:
+            raise _PipeClosed from None
 
 
 class _Interrupted(Exception):
     """Ctrl-C."""
+
+
+class _PipeClosed(Exception):
+    """Whoever read the output has stopped."""
 
 
 @click.group(

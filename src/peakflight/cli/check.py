@@ -18,6 +18,7 @@ from peakflight.cli.output import (
     print_json,
     ranges,
     ratio_cells,
+    seconds,
 )
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, Status
@@ -89,6 +90,9 @@ def _false_claims(values: Mapping[str, Any], plan: Plan, report: Report) -> tupl
     if not _agrees(duration, plan.duration):
         claim = json.dumps(duration)[:LONGEST_QUOTE]
         lines.append(f"claims a duration of {claim} s, the segments take {plan.duration:.9g} s")
+    if values["degree"] != plan.trajectory.degree:
+        claim = json.dumps(values["degree"])[:LONGEST_QUOTE]
+        lines.append(f"claims degree {claim}, the coefficients have {plan.trajectory.degree}")
     claimed = plan.report.peaks
     for name, proven in report.peaks.items():
         if name not in claimed:
@@ -138,14 +142,16 @@ def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[st
         "limits": limits.to_dict(),
         "worst": worst,
         "duration": plan.duration,
-        "continuity": plan.problem.guaranteed_continuity,
+        "continuity": plan.problem.spline_class.continuity,
         "false_claims": list(false_claims),
     }
 
 
 def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) -> None:
     out = Printout()
-    out.path(f"{file}: {plan.duration:.4f} s, {len(plan.trajectory)} segments, by {plan.method}")
+    out.path(
+        f"{file}: {seconds(plan.duration)} s, {len(plan.trajectory)} segments, by {plan.method}"
+    )
     if report.feasible:
         out.line("feasible: proven at every instant, from the coefficients alone", "good")
     else:
@@ -154,7 +160,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
             out.line(f"  {problem}")
     out.table(
         "Limits",
-        ("limit", ">allowed", ">reached", ">ratio", ">margin", "", "binds in segments"),
+        ("limit", ">allowed", ">reached", ">ratio", ">margin", "", "segments"),
         _limit_rows(plan, report),
     )
     out.line()
@@ -163,7 +169,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
         [
             (
                 "joints",
-                f"up to {_derivative(plan.problem.guaranteed_continuity)}, largest jump "
+                f"up to {_derivative(plan.problem.spline_class.continuity)}, largest jump "
                 f"{report.joint_residual:.1e} of its size ({JOINT_TOLERANCE:.0e} allowed)",
             ),
             (
@@ -174,7 +180,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
             (
                 "claims",
                 "; ".join(false_claims)
-                or "feasible or not, peaks and duration agree with the proof",
+                or "feasible or not, peaks, duration and degree agree with the proof",
             ),
         ]
     )

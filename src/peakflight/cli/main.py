@@ -3,6 +3,9 @@
 import gc
 import json
 import sys
+import threading
+import warnings
+from _thread import interrupt_main
 from importlib.util import find_spec
 from typing import NoReturn
 
@@ -11,6 +14,8 @@ LIBRARIES = ("click", "rich")
 GARBAGE = 100_000
 """Allocations between collections: most of what a short run makes lives until it ends."""
 BAD_INPUT = 2
+INSISTENCE = 0.02
+"""How soon a lost Ctrl-C is repeated, s."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 and the number of the signal."""
 
@@ -18,6 +23,9 @@ INTERRUPTED = 130
 def main() -> NoReturn:
     """Run the command line on the arguments of this process, and exit."""
     gc.set_threshold(GARBAGE)
+    sys.unraisablehook = _insist
+    if not sys.warnoptions:  # results tell what a user should know; python -W shows the rest
+        warnings.simplefilter("ignore")
     try:
         code = _run(sys.argv[1:])
     except KeyboardInterrupt:
@@ -25,6 +33,16 @@ def main() -> NoReturn:
         code = INTERRUPTED
     gc.freeze()  # spares the last collection at exit, which costs 0.2 s after numba and matplotlib
     sys.exit(code)
+
+
+def _insist(lost: "sys.UnraisableHookArgs") -> None:
+    """Repeat a Ctrl-C that fell into a callback of compiled code, where it has no effect."""
+    if lost.exc_type is KeyboardInterrupt:
+        timer = threading.Timer(INSISTENCE, interrupt_main)
+        timer.daemon = True
+        timer.start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _run(arguments: list[str]) -> int:

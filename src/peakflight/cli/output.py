@@ -11,8 +11,8 @@ import click
 from peakflight.limits import LimitKind, Limits
 from peakflight.result import BINDING
 
-WIDEST = 100
-"""Columns that output takes at most, however wide the terminal."""
+NARROWEST, WIDEST = 80, 100
+"""Columns that output is laid out for, whatever the terminal has."""
 UNBOUNDED = 1e8
 """Ratios from here on stand for no bound at all, as for least thrust in free fall."""
 STYLES = {"good": "bold green", "bad": "bold red", "title": "bold", "plain": ""}
@@ -28,7 +28,7 @@ class Printout:
         from rich.console import Console
 
         self._console = Console(file=sys.stdout, highlight=False, markup=False, emoji=False)
-        self._console.width = min(self._console.width, WIDEST)
+        self._console.width = min(max(self._console.width, NARROWEST), WIDEST)
         self._console.begin_capture()
 
     def line(self, text: str = "", style: str = "plain") -> None:
@@ -80,6 +80,11 @@ class Printout:
 def print_json(value: Any) -> None:
     """Print one JSON object on a line."""
     click.echo(json.dumps(value, allow_nan=False))
+
+
+def seconds(time: float) -> str:
+    """Print a time in s."""
+    return f"{time:.4f}" if 1e-2 <= time < 1e6 else f"{time:.6g}"
 
 
 def number(kind: LimitKind, value: float) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from peakflight.cli.options import written
-from peakflight.cli.output import Printout, amount, attained, number, ratio_cells
+from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
 from peakflight.limits import KINDS
 from peakflight.result import Plan
 
@@ -50,7 +50,7 @@ def print_plan(
     proof = "yes, at every instant" if plan.feasible else "no"
     out.pairs(
         [
-            ("total time", f"{plan.duration:.4f} s"),
+            ("total time", f"{seconds(plan.duration)} s"),
             ("status", str(plan.status)),
             ("certified", proof),
             ("method", f"{method}; degree {plan.trajectory.degree}"),
@@ -99,7 +99,7 @@ def _legs(plan: Plan) -> Iterator[Sequence[str] | None]:
             continue
         ratio, margin, meaning = ratio_cells(float(kappa[closest[leg], leg]))
         name = LABELS[names[closest[leg]]]
-        yield str(leg), f"{times[leg]:.4f}", name, ratio, margin, meaning
+        yield str(leg), seconds(float(times[leg])), name, ratio, margin, meaning
 
 
 def _worst(plan: Plan) -> Iterator[Sequence[str]]:

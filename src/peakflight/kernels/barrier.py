@@ -166,7 +166,7 @@ def solve_spline(rows, waypoints, simple, layered, times, data):
 
 @inner
 def spline_adjoint(rows, waypoints, simple, layered, times, data, slope, gradient):
-    """gradient (K,) += derivative by log times of what has derivative `slope` by the end data."""
+    """Add to gradient (K,) how what has derivative `slope` by the end data changes by log times."""
     if simple is None:
         pass
     else:

@@ -15,8 +15,6 @@ import numpy as np
 
 from peakflight.kernels.jit import inner, kernel
 
-SINGULAR = 1e-15
-"""A pivot this small in the scaled matrix means that the problem leaves something undetermined."""
 JUMP = 0
 """Kind of constraint: a derivative is continuous."""
 AT_START = 1
@@ -36,7 +34,7 @@ def solve(layout, cost, waypoints, times, rounds, factors, values, data, starts)
     """
     slots = layout.free.shape[2]
     left = _left(layout)
-    if not _factorise(layout, cost, times, factors):
+    if not factorise(layout, cost, times, factors) > 0.0:
         return 1
     for i in range(values.shape[0]):
         for d in range(values.shape[1]):
@@ -108,6 +106,85 @@ def adjoint(layout, cost, waypoints, times, factors, values, slope, gradient):
                             rate = (_order(i, left) - order) * layout.ends[end, order, i]
                             both = adjoints[row, d] * y[i] + values[row, d] * z[i]
                             gradient[k] -= (2 * end - 1) * rate / powers[order] * both
+
+
+@kernel
+def factorise(layout, cost, times, factors):
+    """Scale, assemble and factorise the optimality conditions; returns the smallest pivot."""
+    smallest = np.inf
+    scale, band, pivots = factors
+    slots = layout.free.shape[2]
+    width = 2 * slots - 1
+    left = _left(layout)
+    count = times.size
+    local = np.empty((layout.slot.size, layout.slot.size))
+    reach = np.empty(layout.slot.size)
+    powers = np.empty(layout.slot.size)
+    for a in range(layout.free.shape[0]):
+        scale[a] = 0.0
+        band[a] = 0.0
+        for k in range(count):  # variables are scaled to a unit diagonal
+            _powers(times[k], powers)
+            _piece_energy(cost, times[k], local)
+            for i in range(layout.slot.size):
+                if layout.slot[i] >= 0:
+                    row = (k + _side(i, left)) * slots + layout.slot[i]
+                    scale[a, row] += local[i, i] * powers[_order(i, left)] ** 2
+        for k in range(count + 1):
+            time = min(times[max(k - 1, 0)], times[min(k, count - 1)])
+            for i in range(slots):
+                if layout.order[i] >= 0:
+                    row = k * slots + i
+                    diagonal = scale[a, row]
+                    scale[a, row] = (
+                        1.0 / np.sqrt(diagonal) if diagonal > 0.0 else time ** -layout.order[i]
+                    )
+        for k in range(count):
+            _powers(times[k], powers)
+            _piece_energy(cost, times[k], local)
+            for i in range(layout.slot.size):
+                reach[i] = 0.0
+                node = k + _side(i, left)
+                if layout.slot[i] >= 0 and layout.free[a, node, layout.slot[i]]:
+                    row = node * slots + layout.slot[i]
+                    reach[i] = scale[a, row] * powers[_order(i, left)]
+            for i in range(layout.slot.size):
+                if reach[i] == 0.0:
+                    continue
+                row = (k + _side(i, left)) * slots + layout.slot[i]
+                for j in range(layout.slot.size):
+                    if reach[j] != 0.0:
+                        column = (k + _side(j, left)) * slots + layout.slot[j]
+                        band[a, row, column - row + width] += local[i, j] * reach[i] * reach[j]
+            for q in range(layout.constraints.shape[0]):
+                for end in range(2):
+                    if not _reads(layout.constraints[q, 2], end, k, count):
+                        continue
+                    row = (k + end) * slots + layout.constraints[q, 0]
+                    order = layout.constraints[q, 1]
+                    for j in range(layout.slot.size):
+                        if reach[j] != 0.0 and layout.free[a, k + end, layout.constraints[q, 0]]:
+                            column = (k + _side(j, left)) * slots + layout.slot[j]
+                            band[a, row, column - row + width] += (
+                                (2 * end - 1) * layout.ends[end, order, j] * reach[j]
+                            ) / powers[order]
+        for k in range(count + 1):  # multipliers are scaled to a largest entry of one
+            for i in range(slots):
+                row = k * slots + i
+                if not layout.free[a, k, i]:
+                    band[a, row, width] = 1.0
+                elif layout.order[i] < 0:
+                    top = 0.0
+                    for j in range(2 * width + 1):
+                        top = max(top, abs(band[a, row, j]))
+                    scale[a, row] = 1.0 / top if top > 0.0 else 1.0
+                    for j in range(2 * width + 1):
+                        column = row + j - width
+                        if band[a, row, j] != 0.0:
+                            band[a, row, j] *= scale[a, row]
+                            band[a, column, row - column + width] = band[a, row, j]
+        smallest = min(smallest, _eliminate(band[a], pivots[a], width))
+    return smallest
 
 
 @inner
@@ -217,85 +294,6 @@ def _cost_slope(cost, time, piece, origin, left, i):
 
 
 @inner
-def _factorise(layout, cost, times, factors):
-    """Scale, assemble and factorise the optimality conditions; False if they are singular."""
-    scale, band, pivots = factors
-    slots = layout.free.shape[2]
-    width = 2 * slots - 1
-    left = _left(layout)
-    count = times.size
-    local = np.empty((layout.slot.size, layout.slot.size))
-    reach = np.empty(layout.slot.size)
-    powers = np.empty(layout.slot.size)
-    for a in range(layout.free.shape[0]):
-        scale[a] = 0.0
-        band[a] = 0.0
-        for k in range(count):  # variables are scaled to a unit diagonal
-            _powers(times[k], powers)
-            _piece_energy(cost, times[k], local)
-            for i in range(layout.slot.size):
-                if layout.slot[i] >= 0:
-                    row = (k + _side(i, left)) * slots + layout.slot[i]
-                    scale[a, row] += local[i, i] * powers[_order(i, left)] ** 2
-        for k in range(count + 1):
-            time = min(times[max(k - 1, 0)], times[min(k, count - 1)])
-            for i in range(slots):
-                if layout.order[i] >= 0:
-                    row = k * slots + i
-                    diagonal = scale[a, row]
-                    scale[a, row] = (
-                        1.0 / np.sqrt(diagonal) if diagonal > 0.0 else time ** -layout.order[i]
-                    )
-        for k in range(count):
-            _powers(times[k], powers)
-            _piece_energy(cost, times[k], local)
-            for i in range(layout.slot.size):
-                reach[i] = 0.0
-                node = k + _side(i, left)
-                if layout.slot[i] >= 0 and layout.free[a, node, layout.slot[i]]:
-                    row = node * slots + layout.slot[i]
-                    reach[i] = scale[a, row] * powers[_order(i, left)]
-            for i in range(layout.slot.size):
-                if reach[i] == 0.0:
-                    continue
-                row = (k + _side(i, left)) * slots + layout.slot[i]
-                for j in range(layout.slot.size):
-                    if reach[j] != 0.0:
-                        column = (k + _side(j, left)) * slots + layout.slot[j]
-                        band[a, row, column - row + width] += local[i, j] * reach[i] * reach[j]
-            for q in range(layout.constraints.shape[0]):
-                for end in range(2):
-                    if not _reads(layout.constraints[q, 2], end, k, count):
-                        continue
-                    row = (k + end) * slots + layout.constraints[q, 0]
-                    order = layout.constraints[q, 1]
-                    for j in range(layout.slot.size):
-                        if reach[j] != 0.0 and layout.free[a, k + end, layout.constraints[q, 0]]:
-                            column = (k + _side(j, left)) * slots + layout.slot[j]
-                            band[a, row, column - row + width] += (
-                                (2 * end - 1) * layout.ends[end, order, j] * reach[j]
-                            ) / powers[order]
-        for k in range(count + 1):  # multipliers are scaled to a largest entry of one
-            for i in range(slots):
-                row = k * slots + i
-                if not layout.free[a, k, i]:
-                    band[a, row, width] = 1.0
-                elif layout.order[i] < 0:
-                    top = 0.0
-                    for j in range(2 * width + 1):
-                        top = max(top, abs(band[a, row, j]))
-                    scale[a, row] = 1.0 / top if top > 0.0 else 1.0
-                    for j in range(2 * width + 1):
-                        column = row + j - width
-                        if band[a, row, j] != 0.0:
-                            band[a, row, j] *= scale[a, row]
-                            band[a, column, row - column + width] = band[a, row, j]
-        if not _eliminate(band[a], pivots[a], width):
-            return False
-    return True
-
-
-@inner
 def _piece_energy(cost, time, out):
     """Out (N+1, N+1) <- energy of a piece in full end data by normalised time."""
     out[:] = 0.0
@@ -308,15 +306,21 @@ def _piece_energy(cost, time, out):
 
 @inner
 def _eliminate(band, pivots, width):
-    """LU with row pivoting in place; band[i, j-i+width] is entry (i, j). False if singular."""
+    """LU with row pivoting in place; band[i, j-i+width] is entry (i, j).
+
+    Returns the smallest pivot, 0 or NaN where it had to stop.
+    """
     size = band.shape[0]
+    smallest = np.inf
     for k in range(size):
         best = k
         for i in range(k + 1, min(k + width + 1, size)):
             if abs(band[i, k - i + width]) > abs(band[best, k - best + width]):
                 best = i
-        if not abs(band[best, k - best + width]) > SINGULAR:
-            return False
+        pivot = abs(band[best, k - best + width])
+        if not 0.0 < pivot < np.inf:
+            return 0.0
+        smallest = min(smallest, pivot)
         pivots[k] = best
         last = min(k + 2 * width, size - 1)
         if best != k:
@@ -330,7 +334,7 @@ def _eliminate(band, pivots, width):
             if factor != 0.0:
                 for j in range(k + 1, last + 1):
                     band[i, j - i + width] -= factor * band[k, j - k + width]
-    return True
+    return smallest
 
 
 @inner

@@ -72,7 +72,8 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         task.rows, (task.waypoints, task.simple, task.layered), times,
         problem.limits.as_array(), GRAVITY,
         tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
-        basis.sample_tables(degree, barrier.BATCH), _stages(settings.ladder, settings.stage_iterations), settings.memory,
+        basis.sample_tables(degree, barrier.BATCH),
+        _stages(settings.ladder, settings.stage_iterations), settings.memory,
         barrier.workspace(count, degree), history,
     )  # fmt: skip
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT
