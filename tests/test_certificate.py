@@ -284,3 +284,432 @@ def test_bounds_hold_in_exact_arithmetic_and_are_close(shape):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_bounds_of_a_few_pieces(shape):
     check_pieces(shape, 3, seed=2)
+
+
+def test_kinds_that_are_not_limited_are_not_judged():
+    piece = np.random.default_rng(0).normal(size=(1, 6, 3))
+    limits = [1.0, math.nan, math.nan, 2.0, math.nan, math.nan]
+    upper, lower, _ = kernel_bounds(piece, [1.0], limits)
+    expected = [kind.name in ("speed", "snap") for kind in KINDS]
+    np.testing.assert_array_equal(np.isfinite(upper[0]), expected)
+    np.testing.assert_array_equal(np.isfinite(lower[0]), expected)
+
+
+@kernels
+@pytest.mark.parametrize("size", [1, 2, 3, 4])
+def test_derivatives_that_vanish_have_kappa_zero(size):
+    """Degrees 0 to 3: no snap, no jerk, no acceleration beside gravity, no motion."""
+    piece = np.ones((1, size, 3))
+    upper, lower, _ = kernel_bounds(piece, [2.0], [1.0, 20.0, 1.0, 1.0, 0.5, 2.0])
+    for kind in ("speed", "jerk", "snap"):
+        index = NAMES.index(kind)
+        assert (upper[0, index] == lower[0, index] == 0.0) == (ORDERS[kind] >= size)
+    if size <= 2:
+        hover = [GRAVITY / 20.0, 0.0, 2.0 / GRAVITY]
+        names = ("thrust_acceleration", "tilt", "least_thrust_acceleration")
+        for kind, kappa in zip(names, hover, strict=True):
+            assert upper[0, NAMES.index(kind)] == pytest.approx(kappa, rel=1e-14)
+
+
+@kernels
+def test_bounds_do_not_grow_when_a_piece_is_cut():
+    """The hull of a part lies in the hull of the whole; the attained maximum is in one of them."""
+    rng = np.random.default_rng(3)
+    limits = Limits(speed=1.0, thrust_acceleration=20.0, jerk=1.0, snap=1.0)
+    for _ in range(5):
+        whole = Trajectory(rng.normal(size=(1, 8, 3)), [1.5])
+        parts = whole.split(float(rng.uniform(0.1, 1.4)))
+        peaks = [peak_ratios(part, limits)[0, :4] for part in parts]
+        np.testing.assert_allclose(
+            np.max(peaks, axis=0), peak_ratios(whole, limits)[0, :4], rtol=2e-9
+        )
+
+
+def test_free_fall_has_no_least_thrust_and_no_tilt():
+    falling = Trajectory([[[0, 0, 9], [1, 0, 0], [0, 0, -GRAVITY / 2]]], [1.0])
+    limits = Limits(least_thrust_acceleration=1.0, tilt=0.5)
+    report = certify(falling, limits)
+    assert not report.feasible
+    assert report.peaks["least_thrust_acceleration"][0] == CAP
+    assert report.peaks["tilt"][0] == pytest.approx(math.pi / 0.5)
+    upside_down = Trajectory([[[0, 0, 9], [1, 0, 0], [1, 0, -GRAVITY]]], [1.0])
+    assert certify(upside_down, limits).peaks["tilt"][0] >= math.atan2(2, -GRAVITY) / 0.5
+
+
+# ---- thrust and the other formulas against dense sampling -----------------------------------
+
+
+def wavy(seed, legs=4, minimize="jerk", stretch=1.0):
+    rng = np.random.default_rng(seed)
+    waypoints = np.cumsum(rng.normal(size=(legs + 1, 3)), axis=0)
+    times = rng.uniform(0.5, 1.5, size=legs)
+    return minimum_effort_spline(waypoints, times, minimize=minimize).stretch(stretch)
+
+
+def sampled_values(trajectory, count=20_001):
+    return limited_values([trajectory.sample(count, order) for order in range(1, 5)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_kappa_is_what_samples_show(seed):
+    """With the definitions written out once more: Eq. kapp_i and Eq. kappa2 (Remark 1)."""
+    trajectory = wavy(seed, stretch=1.3)
+    limits = Limits(speed=3.0, thrust_acceleration=15.0, jerk=30.0, snap=300.0, tilt=0.7,
+                    least_thrust_acceleration=5.0)  # fmt: skip
+    peaks = certify(trajectory, limits).peaks
+    v, a, j, s = (trajectory.sample(20_001, order) for order in range(1, 5))
+    f = a + np.array([0.0, 0.0, 9.81])
+    thrust = np.sqrt(f[..., 0] ** 2 + f[..., 1] ** 2 + f[..., 2] ** 2)
+    by_hand = {
+        "speed": np.sqrt((v**2).sum(axis=-1)).max(axis=1) / 3.0,
+        "thrust_acceleration": thrust.max(axis=1) / 15.0,
+        "jerk": np.sqrt((j**2).sum(axis=-1)).max(axis=1) / 30.0,
+        "snap": np.sqrt((s**2).sum(axis=-1)).max(axis=1) / 300.0,
+        "tilt": np.arccos(np.clip(f[..., 2] / thrust, -1, 1)).max(axis=1) / 0.7,
+        "least_thrust_acceleration": 5.0 / thrust.min(axis=1),
+    }
+    for name, expected in by_hand.items():
+        # samples every 0.1 ms miss a smooth peak by the square of that
+        np.testing.assert_allclose(peaks[name], expected, rtol=1e-6)
+        assert (peaks[name] >= expected * (1.0 - 1e-15)).all()
+
+
+def test_gravity_makes_climbing_harder_than_diving():
+    up = Trajectory([[[0, 0, 0], [0, 0, 0], [0, 0, 2.0]]], [1.0])
+    down = Trajectory([[[0, 0, 0], [0, 0, 0], [0, 0, -2.0]]], [1.0])
+    limits = Limits(thrust_acceleration=20.0)
+    assert certify(up, limits).worst == pytest.approx((GRAVITY + 4.0) / 20.0, rel=1e-13)
+    assert certify(down, limits).worst == pytest.approx((GRAVITY - 4.0) / 20.0, rel=1e-13)
+
+
+# ---- uniform stretch ------------------------------------------------------------------------
+
+ALL = {
+    "speed": 5.0, "thrust_acceleration": 15.5, "jerk": 62.0, "snap": 800.0, "tilt": 0.6,
+    "least_thrust_acceleration": 6.0,
+}  # fmt: skip
+LIMIT_SETS = [{name: value} for name, value in ALL.items()] + [
+    {name: ALL[name] for name in NAMES[:4]},
+    ALL,
+]
+every_set = pytest.mark.parametrize(
+    "values", LIMIT_SETS, ids=lambda v: "+".join(v) if len(v) < 6 else "all"
+)
+
+
+def required_stretch(trajectory, values, count=4001):
+    """Uniform stretch that samples ask for, from the equation of each kind (design notes)."""
+    v, a, j, s = (np.concatenate(trajectory.sample(count, order)) for order in range(1, 5))
+    square, vertical = (a**2).sum(axis=1), a[:, 2]
+
+    def larger_root(level, sign):
+        """|a|^2 + 2 g a_z x + g^2 x^2 = level^2 x^2, x = stretch^2; 0 where there is no root."""
+        room = sign * (level**2 - GRAVITY**2)
+        b = sign * GRAVITY * vertical
+        inside = b**2 + sign * room * square
+        real = (inside >= 0.0) & ((b > 0.0) | (sign > 0.0))
+        return np.sqrt(np.where(real, b + np.sqrt(np.where(real, inside, 0.0)), 0.0) / room)
+
+    asked = {
+        "speed": lambda x: np.linalg.norm(v, axis=1) / x,
+        "thrust_acceleration": lambda x: larger_root(x, 1.0),
+        "jerk": lambda x: (np.linalg.norm(j, axis=1) / x) ** (1 / 3),
+        "snap": lambda x: (np.linalg.norm(s, axis=1) / x) ** (1 / 4),
+        "tilt": lambda x: np.sqrt(
+            (np.hypot(a[:, 0], a[:, 1]) / np.tan(x) - vertical).clip(0.0) / GRAVITY
+        ),
+        "least_thrust_acceleration": lambda x: larger_root(x, -1.0),
+    }
+    return max(asked[name](value).max() for name, value in values.items())
+
+
+def diving(minimize="jerk", stretch=1.0):
+    """Mostly up and down, so that thrust falls below its least value at any moderate speed."""
+    waypoints = [[0, 0, 1], [0.3, 0, 3], [0.5, 0.2, 0.5], [0.2, 0.6, 3], [0, 0.4, 1]]
+    times = [1.0, 1.2, 0.9, 1.1]
+    return minimum_effort_spline(waypoints, times, minimize=minimize).stretch(stretch)
+
+
+@every_set
+@pytest.mark.parametrize("too_slow", [1e-4, 0.3, 1.0, 7.0, 1e4])
+@pytest.mark.parametrize("minimize", ["jerk", "snap"])
+@pytest.mark.parametrize("path", [wavy, diving])
+def test_stretch_is_exact_from_anywhere(values, too_slow, minimize, path):
+    limits = Limits(**values)
+    seed = {"seed": len(values)} if path is wavy else {}
+    given = path(**seed, minimize=minimize, stretch=too_slow)
+    found, factor = stretch_to_limits(given, limits)
+    report = certify(found, limits)
+    assert report.feasible
+    # the path is the same, flown at another speed
+    np.testing.assert_allclose(found.segment_times, factor * given.segment_times, rtol=1e-15)
+    powers = np.arange(given.degree + 1.0)
+    terms = given.coefficients * given.segment_times[:, None, None] ** powers[:, None]
+    stretched = found.coefficients * found.segment_times[:, None, None] ** powers[:, None]
+    np.testing.assert_allclose(stretched, terms, rtol=1e-14, atol=1e-14 * np.abs(terms).max())
+    if values == {"least_thrust_acceleration": 6.0} and (path is wavy or too_slow < 0.3):
+        return  # a path that does not dive, or is flown so fast that thrust never vanishes
+    # the stretch is closed to 1e-9; where little thrust is left, tilt changes faster than that
+    assert 1.0 - (1e-8 if "tilt" in values else 2e-9) <= report.worst <= 1.0
+    # samples miss the worst point by the square of their distance
+    assert factor == pytest.approx(required_stretch(given, values), rel=1e-6)
+
+
+@every_set
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_faster_keeps_the_limits(values, seed):
+    limits = Limits(**values)
+    path = diving() if seed == 3 else wavy(10 + seed)
+    if seed < 3 and values == {"least_thrust_acceleration": 6.0}:
+        values = {**values, "speed": 5.0}  # some paths never dive, and nothing slows them down
+        limits = Limits(**values)
+    found, _ = stretch_to_limits(path, limits)
+    assert not certify(found.stretch(1.0 - 1e-7), limits).feasible
+    assert certify(found.stretch(1.0 + 1e-7), limits).feasible
+
+
+@pytest.mark.parametrize(
+    ("values", "power"), [({"speed": 2.0}, 1), ({"jerk": 2.0}, 3), ({"snap": 2.0}, 4)]
+)
+def test_stretch_follows_the_power_of_the_derivative(values, power):
+    found, _ = stretch_to_limits(wavy(1), Limits(**values))
+    looser, _ = stretch_to_limits(wavy(1), Limits(**{name: 2 * x for name, x in values.items()}))
+    assert found.duration / looser.duration == pytest.approx(2.0 ** (1.0 / power), rel=2e-9)
+
+
+def test_stretch_keeps_the_start_time():
+    found, _ = stretch_to_limits(wavy(1).shift(4.0), Limits(speed=1.0))
+    assert found.start_time == 4.0
+
+
+def test_what_never_moves_need_not_be_stretched():
+    still = Trajectory(np.ones((2, 1, 3)), [1.0, 2.0])
+    found, factor = stretch_to_limits(still, Limits(**ALL))
+    assert factor == 1.0
+    assert certify(found, Limits(**ALL)).feasible
+
+
+def test_a_vertical_dive_is_slowed_until_it_is_no_longer_weightless():
+    """No tilt short of free fall, and no bound in it: feasible, though kappa is nowhere near 1."""
+    up_and_down = minimum_effort_spline([[0, 0, 3], [0, 0, 0], [0, 0, 3]], [1.0, 1.0])
+    limits = Limits(tilt=0.5)
+    found, _ = stretch_to_limits(up_and_down, limits)
+    assert certify(found, limits).feasible
+    lowest = found.sample(2001, 2)[..., 2].min()
+    assert lowest == pytest.approx(-GRAVITY, rel=1e-6)
+
+
+def test_speed_exactly_at_its_limit():
+    """Rounding up leaves the bound a hair above 1: not proven, and said so; a hair slower is."""
+    steady = Trajectory([[[0, 0, 1], [3.0, 4.0, 0.0]]], [2.0])
+    report = certify(steady, Limits(speed=5.0))
+    assert 1.0 <= report.worst <= 1.0 + 1e-13
+    assert report.feasible == (report.worst == 1.0)
+    found, factor = stretch_to_limits(steady, Limits(speed=5.0))
+    assert factor == pytest.approx(1.0, abs=2e-9)
+    assert certify(found, Limits(speed=5.0)).feasible
+
+
+# ---- the report -----------------------------------------------------------------------------
+
+GENTLE = Limits(speed=20.0, thrust_acceleration=60.0)
+
+
+def tampered(trajectory, piece, power, change):
+    coefficients = trajectory.coefficients.copy()
+    coefficients[piece, power] += change
+    return Trajectory(coefficients, trajectory.segment_times)
+
+
+@kernels
+def test_an_honest_trajectory_is_reported_so():
+    trajectory = wavy(2)
+    at = np.append(trajectory.breakpoints[:-1], trajectory.end_time)
+    report = certify(trajectory, GENTLE, waypoints=trajectory(at), continuity=4)
+    assert report.feasible
+    assert report.problems == ()
+    assert report.joint_residual <= 1e-12
+    assert report.waypoint_error <= 1e-12
+    assert set(report.peaks) == {"speed", "thrust_acceleration"}
+    assert all(kappa.shape == (4,) for kappa in report.peaks.values())
+
+
+@kernels
+@pytest.mark.parametrize(
+    ("power", "name"),
+    [(0, "position"), (1, "velocity"), (2, "acceleration"), (3, "jerk"), (4, "snap")],
+)
+def test_a_jump_is_found_and_named(power, name):
+    """A changed coefficient of the last piece jumps at one joint, by a known amount."""
+    trajectory = wavy(2)
+    changed = tampered(trajectory, 3, power, [3e-4, 0.0, 4e-4])
+    report = certify(changed, GENTLE, continuity=4)
+    c, h = changed.coefficients[2:], changed.segment_times[2:]
+    size = max((np.abs(c[k, j]) * h[k] ** (j - power)).max() for k in (0, 1) for j in range(1, 6))
+    size = max(size, np.abs(c[0, 0]).max()) if power == 0 else size
+    assert report.joint_residual == pytest.approx(5e-4 / size, rel=1e-6)
+    assert not report.feasible
+    assert len(report.problems) == 1
+    assert report.problems[0].startswith(f"{name} jumps at the end of segment 2, by ")
+    below = certify(changed, GENTLE, continuity=max(power - 1, 0))
+    assert below.feasible == (power > 0)
+
+
+def test_jumps_below_the_tolerance_are_rounding_and_above_are_not():
+    trajectory = wavy(2)
+    c, h = trajectory.coefficients[2:], trajectory.segment_times[2:]
+    size = max((np.abs(c[k, j]) * h[k] ** (j - 2)).max() for k in (0, 1) for j in range(1, 6))
+    for part, feasible in ((0.9, True), (1.1, False)):
+        changed = tampered(trajectory, 3, 2, [0.0, part * JOINT_TOLERANCE * size, 0.0])
+        assert certify(changed, GENTLE).feasible == feasible
+
+
+def test_a_jump_in_the_middle_of_many_is_the_one_named():
+    trajectory = wavy(3, legs=40)
+    report = certify(tampered(trajectory, 17, 0, 1.0), GENTLE)
+    assert "at the end of segment 16" in report.problems[0] or "segment 17" in report.problems[0]
+
+
+@pytest.mark.parametrize("index", [0, 1, 3, 4])
+def test_a_missed_waypoint_is_named(index):
+    trajectory = wavy(2)
+    at = np.append(trajectory.breakpoints[:-1], trajectory.end_time)
+    waypoints = trajectory(at)
+    waypoints[index] += [0.0, 0.3, -0.4]
+    report = certify(trajectory, GENTLE, waypoints=waypoints)
+    assert report.waypoint_error == pytest.approx(0.5, rel=1e-9)
+    assert report.problems == (f"waypoint {index} is missed by 0.5 m",)
+    assert not report.feasible
+    assert certify(trajectory, GENTLE).feasible  # nobody asked
+
+
+def test_waypoints_count_as_passed_within_the_tolerance():
+    trajectory = wavy(2)
+    at = np.append(trajectory.breakpoints[:-1], trajectory.end_time)
+    waypoints = trajectory(at)
+    allowed = WAYPOINT_TOLERANCE * (1.0 + np.abs(waypoints).max())
+    for part, feasible in ((0.9, True), (1.1, False)):
+        moved = waypoints.copy()
+        moved[2, 0] += part * allowed
+        assert certify(trajectory, GENTLE, waypoints=moved).feasible == feasible
+
+
+def test_every_limit_that_is_broken_is_named_with_its_worst_segment():
+    trajectory = wavy(2)
+    values = sampled_values(trajectory, 2001)
+    limits = Limits(speed=0.5 * values["speed"].max(), jerk=2.0 * values["jerk"].max(),
+                    snap=0.25 * values["snap"].max())  # fmt: skip
+    report = certify(trajectory, limits)
+    segment = {name: int(values[name].max(axis=1).argmax()) for name in values}
+    assert len(report.problems) == 2
+    # samples miss the peaks by the square of their distance, which is below the sixth digit
+    speed, snap = limits.speed, limits.snap
+    assert report.problems == (
+        f"speed reaches 2 times its limit of {speed:g} m/s in segment {segment['speed']}",
+        f"snap reaches 4 times its limit of {snap:g} m/s^4 in segment {segment['snap']}",
+    )
+
+
+def test_several_pieces_a_leg():
+    whole = wavy(2, legs=2)
+    first, second = whole.pieces()
+    cut = Trajectory.concatenate([*first.split(0.2), *second.split(second.start_time + 0.3)])
+    waypoints = whole([0.0, whole.breakpoints[1], whole.end_time])
+    assert certify(cut, GENTLE, waypoints=waypoints, pieces=(2, 2), continuity=4).feasible
+    assert not certify(cut, GENTLE, waypoints=waypoints, pieces=(1, 3)).feasible
+    with pytest.raises(InvalidProblem, match="pieces add up to 3; there are 4"):
+        certify(cut, GENTLE, waypoints=waypoints, pieces=(1, 2))
+    with pytest.raises(InvalidProblem, match=r"waypoints has shape \(3, 3\); it must be \(5, 3\)"):
+        certify(cut, GENTLE, waypoints=waypoints)
+
+
+@pytest.mark.parametrize("call", [certify, stretch_to_limits, peak_ratios])
+@pytest.mark.parametrize("axes", [1, 2, 4])
+def test_limits_are_about_three_axes(call, axes):
+    flat = Trajectory(np.ones((1, 2, axes)), [1.0])
+    with pytest.raises(InvalidProblem, match=f"the trajectory has {axes} axes; limits are about"):
+        call(flat, Limits(speed=1.0))
+
+
+def test_a_plan_is_proven_again_from_its_own_file():
+    made = plan(np.array([[0.0, 0, 1], [1, 0, 1], [1, 1, 1.5]]), method="proportional",
+                limits=Limits(speed=2.0, thrust_acceleration=15.0))  # fmt: skip
+    report = certify_plan(made)
+    assert report.feasible
+    assert report.to_dict() == made.report.to_dict()
+
+
+# ---- infeasible is never reported feasible --------------------------------------------------
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.data())
+def test_feasible_is_never_claimed_falsely(data):
+    """Random trajectories with limits right around their peaks, a part in 1e-15 to 1e-3 off."""
+    seed = data.draw(st.integers(0, 2**32 - 1))
+    rng = np.random.default_rng(seed)
+    legs, degree = data.draw(st.integers(1, 3)), data.draw(st.sampled_from([5, 7]))
+    minimize = {5: "jerk", 7: "snap"}[degree]
+    waypoints = np.cumsum(rng.normal(size=(legs + 1, 3)) * 10.0 ** rng.uniform(-2, 2), axis=0)
+    times = 10.0 ** rng.uniform(-0.5, 0.5, size=legs)
+    trajectory = minimum_effort_spline(waypoints, times, minimize=minimize)
+    if data.draw(st.booleans()):  # gentle enough for tilt and least thrust to mean something
+        trajectory, _ = stretch_to_limits(trajectory, Limits(thrust_acceleration=15.0))
+    values = sampled_values(trajectory, 501)
+    limits = {}
+    for name in data.draw(st.sets(st.sampled_from(NAMES), min_size=1)):
+        offset = 10.0 ** data.draw(st.floats(-15.0, -3.0)) * data.draw(st.sampled_from([-1, 1]))
+        worst = values[name].min() if name.startswith("least") else values[name].max()
+        limits[name] = worst * (1.0 - offset if name.startswith("least") else 1.0 + offset)
+    allowed = {"thrust_acceleration": (GRAVITY, np.inf), "tilt": (0.0, math.pi / 2),
+               "least_thrust_acceleration": (0.0, GRAVITY)}  # fmt: skip
+    limits = {
+        name: value for name, value in limits.items()
+        if allowed.get(name, (0.0, np.inf))[0] < value < allowed.get(name, (0.0, np.inf))[1]
+    }  # fmt: skip
+    if not limits:
+        return
+    report = certify(trajectory, Limits(**limits))
+    dense = sampled_values(trajectory, 2001)
+    for name, limit in limits.items():
+        kept = (
+            dense[name].min() >= limit * (1.0 - 1e-12)
+            if name.startswith("least")
+            else dense[name].max() <= limit * (1.0 + 1e-12)
+        )
+        if report.feasible:
+            assert kept, name
+        if report.peaks[name].max() <= 1.0:
+            assert kept, name
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(NAMES), st.floats(1e-8, 1e-2))
+def test_feasible_is_claimed_where_there_is_room(seed, name, room):
+    trajectory, _ = stretch_to_limits(wavy(seed, legs=2), Limits(**ALL))
+    worst = peak_ratios(trajectory, Limits(**{name: ALL[name]}))[:, NAMES.index(name)].max()
+    needed = ALL[name] * (worst if not name.startswith("least") else 1.0 / worst)
+    loose = needed * (1.0 + room if not name.startswith("least") else 1.0 - room)
+    if name == "thrust_acceleration" and loose <= GRAVITY:
+        return
+    if name == "least_thrust_acceleration" and loose >= GRAVITY:
+        return
+    assert certify(trajectory, Limits(**{name: loose})).feasible
+
+
+def test_every_piece_is_looked_at():
+    """A single bad piece among many good ones, anywhere."""
+    limits = Limits(speed=10.0)
+    trajectory = wavy(4, legs=30)
+    for piece, sign in product((0, 13, 29), (-1.0, 1.0)):
+        report = certify(tampered(trajectory, piece, 5, sign * 500.0), limits)
+        assert not report.feasible
+        assert int(np.argmax(report.peaks["speed"])) == piece
+
+
+def test_limits_of_a_problem_are_certified_with_its_own_continuity():
+    points = [[0, 0, 1], [1, 0, 1], [2, 1, 1]]
+    problem = Problem(points, limits=GENTLE, minimize="snap", degree=5)
+    spline = minimum_effort_spline(points, [1.0, 1.0], minimize="snap", degree=5)
+    assert certify(spline, GENTLE, continuity=problem.continuity).feasible
+    assert not certify(spline, GENTLE, continuity=problem.continuity + 1).feasible

@@ -265,6 +265,21 @@ class TestPlan:
         assert len(result.stdout.splitlines()) < 60
         assert run("check", "big-plan/plan.json").exit_code == 0
 
+    def test_what_stopped_the_method_early_is_a_note(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        solve = peakflight.planner.plan
+
+        def stop(problem: pf.Problem, **options: object) -> pf.Plan:
+            plan = solve(problem, **options)
+            return replace(plan, status=pf.Status.ITERATION_LIMIT, message="2000 were not enough")
+
+        monkeypatch.setattr(peakflight.planner, "plan", stop)
+        result = run("plan", "lap.csv", *QUICK)
+        assert result.exit_code == 0
+        assert "status         iteration limit" in result.stdout
+        assert "note: 2000 were not enough" in result.stdout
+
     def test_no_feasible_trajectory(
         self, run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

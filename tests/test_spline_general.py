@@ -30,8 +30,6 @@ class Case:
     derivatives: dict = field(default_factory=dict)
     free: tuple = ()
     """(waypoint, axis) of positions that are free."""
-    jumps_above: int | None = None
-    """Highest continuous derivative, where it is lower than `continuity`; see `is_classical`."""
 
     @property
     def waypoints(self):
@@ -110,25 +108,26 @@ CASES = [
     Case("jerk at the end of degree 6", 6, {3: 1}, 3, end={3: [2]}),
     Case("only a high order at the end", 6, {3: 1}, 2, end={1: [NAN], 2: [NAN], 4: [5]}),
     # fixed inner derivatives
-    Case("inner velocity of the classical one", 5, {3: 1}, 4, derivatives={1: {1: [1]}},
-         jumps_above=2),
+    Case("inner velocity, classical but C2", 5, {3: 1}, 2, derivatives={1: {1: [1]}}),
+    Case("inner velocity, classical but C3", 5, {3: 1}, 3, derivatives={1: {1: [1]}}),
+    Case("inner velocity, classical but C4", 7, {4: 1}, 4, derivatives={2: {1: [1]}}),
     Case("inner state", 5, {4: 1}, 3, derivatives={2: {1: [1], 2: [0]}}),
     Case("inner velocity at every waypoint", 7, {4: 1}, 4, derivatives={1: {1: [1]}, 2: {1: [-1]}}),
     Case("inner order beyond continuity", 7, {3: 1}, 2, derivatives={1: {3: [4]}}),
-    Case("inner order beyond the end data", 5, {3: 1}, 4, derivatives={1: {4: [4]}}, jumps_above=2),
+    Case("inner order beyond the end data", 5, {3: 1}, 2, derivatives={1: {4: [4]}}),
     Case("inner jerk at C3", 5, {4: 1}, 3, derivatives={1: {3: [4]}}),
     Case("inner snap at C3", 5, {4: 1}, 3, derivatives={1: {4: [4]}}),
-    Case("inner snap at C5, degree 7", 7, {4: 1}, 5, derivatives={1: {4: [4]}}, jumps_above=3),
+    Case("inner snap at C5, degree 7", 7, {4: 1}, 5, derivatives={1: {4: [4]}}),
     Case("inner jerk, degree 6, C2", 6, {3: 1}, 2, derivatives={1: {3: [4]}}),
-    Case("per axis", 5, {3: 1}, 4, axes=3, start={1: [1, 0, NAN]}, end={2: [NAN, NAN, 1]},
-         derivatives={1: {1: [NAN, 2, NAN]}, 2: {2: [0, NAN, NAN]}}, jumps_above=2),
+    Case("per axis", 5, {3: 1}, 2, axes=3, start={1: [1, 0, NAN]}, end={2: [NAN, NAN, 1]},
+         derivatives={1: {1: [NAN, 2, NAN]}, 2: {2: [0, NAN, NAN]}}),
     # free positions
     Case("free inner position", 5, {3: 1}, 4, free=((1, 0),)),
     Case("free inner position, mixed", 7, {2: 1, 4: 0.5}, 4, free=((2, 0),), axes=2),
     Case("free last position", 5, {3: 1}, 4, free=((3, 0),)),
     Case("free first and inner positions", 5, {4: 1}, 3, free=((0, 0), (2, 0))),
     Case("free positions with inner velocity", 5, {3: 1}, 4, free=((1, 0),),
-         derivatives={1: {1: [3]}}, jumps_above=2),
+         derivatives={1: {1: [3]}}),
     Case("all free but weighed", 5, {0: 3, 3: 1}, 4, free=tuple((k, 0) for k in range(4)),
          start={1: [2], 2: [0]}),
     Case("free position, degree 6, weighed", 6, {0: 1, 3: 1}, 5, free=((1, 0),)),
@@ -156,11 +155,10 @@ def constraint_rows(case, axis, number=Fraction):
         rows.append(row)
         right.append(number(value))
 
-    continuity = case.continuity if case.jumps_above is None else case.jumps_above
     for waypoint in range(legs + 1):
         for order in range(case.degree):
             known = not np.isnan(fixed[waypoint, order])
-            joined = 0 < waypoint < legs and order <= continuity
+            joined = 0 < waypoint < legs and order <= case.continuity
             if joined:
                 derivative([(waypoint - 1, times[waypoint - 1], order, 1),
                             (waypoint, number(0), order, -1)], 0)  # fmt: skip
@@ -385,6 +383,12 @@ NOT_ONE_ANSWER = {
     },
     "contradiction: degree 5, C4, jerk at the start": {
         "minimize": "snap", "degree": 5, "continuity": 4, "start": {3: [1.0]},
+    },
+    "contradiction: degree 5, C4, inner velocity of the classical one": {
+        "minimize": "jerk", "degree": 5, "continuity": 4, "derivatives": {1: {1: [1.0]}},
+    },
+    "contradiction: degree 5, C4, jerk at the start of the classical one": {
+        "minimize": "jerk", "start": {3: [0.0]},
     },
     "contradiction: degree 5, C4, inner velocity": {
         "minimize": "snap", "degree": 5, "continuity": 4, "derivatives": {1: {1: [1.0]}},

@@ -1,11 +1,12 @@
 """The folder that a command fills: all of its files together, or none."""
 
 import re
-import tempfile
+import shutil
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+from uuid import uuid4
 
 from peakflight.errors import InvalidFile
 from peakflight.files import PathLike, prepare_folder
@@ -32,19 +33,21 @@ class OutputFolder:
 
     def __init__(self, path: PathLike) -> None:
         self.path = Path(path)
+        self.stage = self.path / f".peakflight-{uuid4().hex[:12]}"
+        """Where files are written until all are complete."""
+        self._made: list[Path] = []
 
     def __enter__(self) -> Self:
-        self._made: list[Path] = []
         folders = (self.path, *self.path.parents)
         try:
             self._made = [folder for folder in folders if not folder.exists()]
             prepare_folder(self.path)
-            self._stage = tempfile.TemporaryDirectory(dir=self.path, prefix=".peakflight-")
+            self.stage.mkdir()
         except OSError as error:
-            self._remove_if_empty()
+            self._tidy_up()
             raise InvalidFile(f"{self.path}: cannot be written to ({_reason(error)})") from None
         except BaseException:
-            self._remove_if_empty()
+            self._tidy_up()
             raise
         return self
 
@@ -59,15 +62,9 @@ class OutputFolder:
             if error is None or isinstance(error, Exception):
                 self._publish()
         finally:
-            self._stage.cleanup()
-            self._remove_if_empty()
+            self._tidy_up()
         if isinstance(error, InvalidFile) and staged in str(error):
             raise InvalidFile(str(error).replace(staged, str(self.path))) from None
-
-    @property
-    def stage(self) -> Path:
-        """Where files are written until all are complete."""
-        return Path(self._stage.name)
 
     def published(self, name: str) -> Path:
         """Where a file will be."""
@@ -81,8 +78,9 @@ class OutputFolder:
             except OSError as error:
                 raise InvalidFile(f"{target}: cannot be written ({_reason(error)})") from None
 
-    def _remove_if_empty(self) -> None:
-        """Remove folders that were made for nothing, the innermost first."""
+    def _tidy_up(self) -> None:
+        """Remove what is not complete, and folders that were made for nothing."""
+        shutil.rmtree(self.stage, ignore_errors=True)
         for folder in self._made:
             with suppress(OSError):
                 folder.rmdir()

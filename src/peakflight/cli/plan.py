@@ -109,11 +109,13 @@ def plan(
         with OutputFolder(output or folder_for(read.name)) as folder:
             progress.stage(f"planning {len(read)} waypoints by {method}")
             answer = _solve(problem, method, variant)
+            remarks = (answer.message,) if answer.message and answer.feasible else ()
             if notes:
                 said = (*notes, answer.message) if answer.message else notes
                 answer = replace(answer, message="; ".join(said))
             progress.stage("writing the files")
             files, more = _write(answer, folder, exports)
+            more = (*remarks, *more)
             if not no_figures:
                 progress.stage("drawing the pictures")
                 drawn, why_not = _draw(answer, folder)

@@ -103,8 +103,9 @@ def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
 def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place):
     """Scale a trajectory by the smallest uniform stretch that keeps every limit, certified.
 
-    As `certify`; coefficients and times are replaced. Returns the stretch, or NaN if there is
-    none. The path stays: derivative s is divided by the stretch to the power s.
+    As `certify`, with coefficients and times replaced; upper, lower and place are scratch. Returns
+    the stretch, or NaN if there is none. The path stays: derivative s is divided by the stretch to
+    the power s.
     """
     original = coefficients.copy()
     durations = times.copy()
@@ -140,7 +141,6 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
         return np.nan
     if best != factor:
         _rescale(original, durations, best, coefficients, times)
-        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place)
     return best
 
 

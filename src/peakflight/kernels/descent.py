@@ -136,10 +136,12 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
             if iteration == longest:
                 converged = False
                 break
-            slope = _direction(pairs, kept, gradient, diagonal, shrink, direction)
-            if not slope < 0.0:
-                kept = none
+            for attempt in range(2):
+                if attempt > 0:
+                    kept = none  # steepest descent, where L-BFGS does not lead down
                 slope = _direction(pairs, kept, gradient, diagonal, shrink, direction)
+                if slope < 0.0:
+                    break
             if not slope < 0.0:
                 break
             largest = 0.0
