@@ -86,13 +86,6 @@ def test_limits_refuse(values, message):
     refuses(message, Limits, **values)
 
 
-@pytest.mark.parametrize("values", [{"tilt": 0.5}, {"least_thrust_acceleration": 3.0},
-                                    {"tilt": 0.5, "least_thrust_acceleration": 3.0}])  # fmt: skip
-def test_limits_that_do_not_bound_how_fast_a_flight_can_be_are_refused(values):
-    """Straight up, tilt is zero at any speed; and no path must ever lose its thrust."""
-    refuses("no limit", Limits, **values)
-
-
 def test_limits_are_frozen_floats_in_the_order_of_kinds():
     limits = Limits(snap=800, speed=np.float32(5.0), tilt=0.5)
     assert_frozen(limits)
@@ -771,9 +764,7 @@ def test_a_report_is_frozen_and_shares_nothing():
     st.lists(st.text(max_size=20), max_size=3),
 )
 def test_reports_through_json(feasible, peaks, residual, problems):
-    report = some_report(
-        feasible=feasible, peaks=peaks, joint_residual=residual, problems=problems
-    )
+    report = some_report(feasible=feasible, peaks=peaks, joint_residual=residual, problems=problems)
     copy = Report.from_dict(through_json(report))
     assert (copy.feasible, copy.joint_residual, copy.waypoint_error, copy.problems) == (
         report.feasible, report.joint_residual, report.waypoint_error, report.problems,
@@ -845,9 +836,7 @@ def test_a_plan_knows_its_times(hand_plan):
     plan = hand_plan(pieces=(1, 2, 1))
     assert plan.duration == plan.trajectory.duration
     np.testing.assert_array_equal(plan.segment_times, plan.trajectory.segment_times)
-    np.testing.assert_array_equal(
-        plan.waypoint_times, plan.trajectory.breakpoints[[0, 1, 3, 4]]
-    )
+    np.testing.assert_array_equal(plan.waypoint_times, plan.trajectory.breakpoints[[0, 1, 3, 4]])
     assert plan.feasible
     assert_frozen(plan)
 

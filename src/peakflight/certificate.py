@@ -4,7 +4,7 @@ Nothing here is shared with the optimisers: bounds are taken of the coefficients
 the file (`kernels.bounds`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,7 @@ def certify(
     waypoints: ArrayLike | None = None,
     pieces: Sequence[int] | None = None,
     continuity: int | None = None,
+    fixed: Mapping[int, np.ndarray] | None = None,
 ) -> Report:
     """Prove what can be proven about a trajectory (Eq. kapp_i, Eq. kappa2).
 
@@ -43,6 +44,9 @@ def certify(
         (legs,) number of pieces in each leg; one each by default.
     continuity
         Highest derivative that should not jump; by default 2, so that attitude does not.
+    fixed
+        Waypoint index to derivatives (n, 3) from velocity on that should be met there, NaN where
+        free; by default not checked. Needs waypoints.
 
     Raises
     ------
@@ -74,18 +78,26 @@ def certify(
     problems = _exceeded(peaks, limits)
     if not jump <= JOINT_TOLERANCE:
         problems.append(
-            f"{DERIVATIVE_NAMES[order] if order < len(DERIVATIVE_NAMES) else f'derivative {order}'}"
-            f" jumps at the end of segment {joint}, by {jump:.1e} of its size there"
+            f"{_derivative_name(order)} jumps at the end of segment {joint}, by {jump:.1e} of its "
+            "size there"
         )
     if waypoints is not None:
         tolerance = WAYPOINT_TOLERANCE * (1.0 + float(np.abs(points).max()))
         if not miss <= tolerance:
             problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
+    state_error = 0.0
+    if fixed:
+        state_error, index, order = _state_error(coefficients, times, firsts, fixed)
+        if not state_error <= JOINT_TOLERANCE:
+            problems.append(
+                f"{_derivative_name(order)} at waypoint {index} is not the one that is fixed there"
+            )
     return Report(
         feasible=not problems,
         peaks=peaks,
         joint_residual=float(jump),
         waypoint_error=float(miss) if waypoints is not None else 0.0,
+        state_error=state_error,
         problems=tuple(problems),
     )
 
@@ -105,6 +117,7 @@ def certify_answer(
         waypoints=problem.waypoints,
         pieces=pieces,
         continuity=problem.spline_class.continuity,
+        fixed=problem.fixed,
     )
 
 
@@ -148,6 +161,30 @@ def _bound(
         TOLERANCE, upper, lower, place,
     )  # fmt: skip
     return upper, lower, place
+
+
+def _state_error(
+    coefficients: np.ndarray, times: np.ndarray, firsts: np.ndarray, fixed: Mapping[int, np.ndarray]
+) -> tuple[float, int, int]:
+    """Largest difference from what is fixed, with its waypoint and derivative."""
+    indices = list(fixed)
+    rows = max(len(state) for state in fixed.values())
+    states = np.full((len(indices), rows, 3), np.nan)
+    for row, state in zip(states, fixed.values(), strict=True):
+        row[: len(state)] = state
+    at_end = np.array([index == len(firsts) for index in indices])
+    pieces = np.array(
+        [len(times) - 1 if index == len(firsts) else firsts[index] for index in indices]
+    )
+    factorials = bounds.falling_factorials(coefficients.shape[1] - 1)
+    error, where, order = joints.state_errors(
+        coefficients, times, factorials, pieces, at_end, states
+    )
+    return float(error), indices[where], order
+
+
+def _derivative_name(order: int) -> str:
+    return DERIVATIVE_NAMES[order] if order < len(DERIVATIVE_NAMES) else f"derivative {order}"
 
 
 def _tables(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -39,6 +39,11 @@ KINDS = (
 )
 """In the order in which kernels number them."""
 
+BOUNDING = ("speed", "thrust_acceleration", "jerk", "snap")
+"""Limits that bound how fast any course can be flown; a straight climb needs no tilt."""
+SMALLEST, LARGEST = 1e-6, 1e9
+"""Range of values, in SI units: beyond, squares and fourth roots run out of digits."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
@@ -84,8 +89,11 @@ class Limits:
                 f"limit least_thrust_acceleration is {least:g} m/s^2; it must be below gravity "
                 f"({GRAVITY} m/s^2), or the vehicle cannot hover"
             )
-        if not self.active:
-            raise InvalidProblem("no limit is set; set at least one, such as speed=5.0")
+        if all(getattr(self, name) is None for name in BOUNDING):
+            raise InvalidProblem(
+                f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
+                "bounds how fast the flight can be"
+            )
 
     @property
     def active(self) -> tuple[LimitKind, ...]:
@@ -148,4 +156,8 @@ def _positive(name: str, value: Any) -> float:
         raise InvalidProblem(f"limit {name} is {value!r}; it must be a number") from None
     if not (math.isfinite(number) and number > 0.0):
         raise InvalidProblem(f"limit {name} is {number:g}; it must be positive and finite")
+    if not SMALLEST <= number <= LARGEST:
+        raise InvalidProblem(
+            f"limit {name} is {number:g}; it must be from {SMALLEST:g} to {LARGEST:g}"
+        )
     return number

@@ -32,6 +32,8 @@ class Report:
     """Largest jump of a derivative at a joint, relative to its size around the joint."""
     waypoint_error: float
     """Largest distance by which a waypoint is missed, m."""
+    state_error: float = 0.0
+    """Largest difference from a derivative that is fixed at a waypoint, relative to its size."""
     problems: tuple[str, ...] = ()
     """What is wrong, in words, one line each; empty if feasible."""
 
@@ -68,6 +70,7 @@ class Report:
             "peaks": {name: kappa.tolist() for name, kappa in self.peaks.items()},
             "joint_residual": self.joint_residual,
             "waypoint_error": self.waypoint_error,
+            "state_error": self.state_error,
             "problems": list(self.problems),
         }
 
@@ -163,6 +166,7 @@ class Plan:
             "feasible": self.report.feasible,
             "joint_residual": self.report.joint_residual,
             "waypoint_error": self.report.waypoint_error,
+            "state_error": self.report.state_error,
             "problems": list(self.report.problems),
         }
         problem = self.problem.to_dict()
@@ -193,7 +197,9 @@ class Plan:
             raise InvalidProblem(f"key {missing[0]!r} is missing")
         try:
             return cls._from_checked(values)
-        except (TypeError, AttributeError, KeyError) as error:
+        except InvalidProblem:
+            raise
+        except (TypeError, ValueError, AttributeError, KeyError, OverflowError) as error:
             raise InvalidProblem(f"a key has a value of the wrong kind ({error})") from None
 
     @classmethod
@@ -207,6 +213,10 @@ class Plan:
             }
         )
         trajectory = Trajectory.from_dict(dict(values))
+        if values["degree"] != trajectory.degree:
+            raise InvalidProblem(
+                f"degree is {values['degree']!r}; the coefficients have {trajectory.degree}"
+            )
         pieces = tuple(int(count) for count in values["pieces"])
         if sum(pieces) != len(trajectory) or len(pieces) != len(problem.waypoints) - 1:
             raise InvalidProblem(
@@ -226,6 +236,7 @@ class Plan:
             peaks=dict(values["peaks"]),
             joint_residual=float(values.get("joint_residual", np.nan)),
             waypoint_error=float(values.get("waypoint_error", np.nan)),
+            state_error=float(values.get("state_error", np.nan)),
             problems=tuple(values.get("problems", ())),
         )
         history = values.get("history")

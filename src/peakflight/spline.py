@@ -31,6 +31,10 @@ class Undetermined(InvalidProblem):
     """Cost and constraints leave something free, or contradict each other."""
 
 
+class OutOfRange(InvalidProblem):
+    """Durations or distances differ too much for double precision."""
+
+
 @dataclass(frozen=True, eq=False)
 class SplineTask:
     """A spline problem laid out for the kernels, ready to be solved for any segment times.
@@ -126,7 +130,7 @@ class SplineTask:
 
         Raises
         ------
-        InvalidProblem
+        OutOfRange
             If the durations differ too much for double precision.
         """
         times = fresh(segment_times)
@@ -145,12 +149,16 @@ class SplineTask:
             code = general.solve(
                 layout, cost, self.waypoints, times, REFINEMENTS, factors, values, data, starts
             )
-            if code != 0 or not np.isfinite(data).all():
-                raise InvalidProblem(
-                    "the spline cannot be computed in double precision: durations differ too much "
-                    f"({times.min():g} to {times.max():g} s) for degree {self.spline_class.degree}"
-                )
-        return Trajectory(coefficients_of(data, starts, times), times)
+            if code != 0:
+                data[:] = np.nan
+        with np.errstate(all="ignore"):
+            coefficients = coefficients_of(data, starts, times)
+        if not np.isfinite(coefficients).all():
+            raise OutOfRange(
+                "the spline cannot be computed in double precision: legs and durations differ too "
+                f"much ({times.min():g} to {times.max():g} s) for degree {self.spline_class.degree}"
+            )
+        return Trajectory(coefficients, times)
 
 
 def is_plain(

@@ -57,8 +57,8 @@ def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-kernel = _compiled()
-"""Decorator of every kernel that Python calls."""
+kernel = _compiled(nogil=True)
+"""Decorator of every kernel that Python calls; other threads run meanwhile."""
 inner = _compiled(**_INNER)
 """Decorator of kernels that only kernels call: no entry point from Python, less to compile."""
 vector = _compiled(**_INNER, fastmath={"reassoc", "contract", "nsz"})

@@ -27,16 +27,10 @@ def residuals(coefficients, times, continuity, factorials, waypoints, firsts):
                 end = _at_end(coefficients, times, factorials, k, s, d)
                 start = factorials[s, s] * coefficients[k + 1, s, d] if s < size else 0.0
                 jump += (end - start) ** 2
-            scale = 0.0
-            for piece in range(k, k + 2):
-                power = 1.0
-                for j in range(1, size):
-                    power *= times[piece]
-                    for d in range(axes):
-                        scale = max(
-                            scale, abs(coefficients[piece, j, d]) * power / times[piece] ** s
-                        )
-            scale *= factorials[s, s] if s < size else 1.0
+            scale = max(
+                _scale(coefficients, times, factorials, k, s),
+                _scale(coefficients, times, factorials, k + 1, s),
+            )
             if s == 0:  # a position is as exact as its coordinates
                 for d in range(axes):
                     scale = max(scale, abs(coefficients[k, 0, d]))
@@ -58,6 +52,50 @@ def residuals(coefficients, times, continuity, factorials, waypoints, firsts):
             miss = np.sqrt(distance)
             waypoint = leg
     return worst, joint, order, miss, waypoint
+
+
+@kernel
+def state_errors(coefficients, times, factorials, pieces, at_end, states):
+    """Largest difference between the motion and what is fixed, relative as in `residuals`.
+
+    states (F, n, D): derivatives from velocity on, NaN where free, at the start of each of pieces
+    (F,), or at its end where at_end (F,) says so. Returns it with its number and derivative.
+    """
+    worst = 0.0
+    where = 0
+    order = 0
+    for i in range(pieces.size):
+        k = pieces[i]
+        for s in range(1, states.shape[1] + 1):
+            difference = 0.0
+            for d in range(coefficients.shape[2]):
+                if not np.isnan(states[i, s - 1, d]):
+                    value = 0.0
+                    if s < coefficients.shape[1]:
+                        value = factorials[s, s] * coefficients[k, s, d]
+                        if at_end[i]:
+                            value = _at_end(coefficients, times, factorials, k, s, d)
+                    difference += (value - states[i, s - 1, d]) ** 2
+            scale = _scale(coefficients, times, factorials, k, s)
+            if not np.sqrt(difference) <= worst * scale:
+                worst = np.sqrt(difference) / scale if scale > 0.0 else np.inf
+                where = i
+                order = s
+    return worst, where, order
+
+
+@inner
+def _scale(coefficients, times, factorials, piece, order):
+    """Size that the motion of a piece gives a derivative: s! max_j |c_j h^j| / h^s."""
+    scale = 0.0
+    power = 1.0
+    for j in range(1, coefficients.shape[1]):
+        power *= times[piece]
+        for d in range(coefficients.shape[2]):
+            scale = max(scale, abs(coefficients[piece, j, d]) * power)
+    if order < coefficients.shape[1]:
+        scale *= factorials[order, order]
+    return scale / times[piece] ** order
 
 
 @inner

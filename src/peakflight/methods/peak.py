@@ -22,7 +22,7 @@ from peakflight.methods.algorithm1 import Algorithm1Settings
 from peakflight.methods.scaling import estimated_stretch, finish, proportional_times
 from peakflight.problem import Problem
 from peakflight.result import History
-from peakflight.spline import SplineTask
+from peakflight.spline import OutOfRange, SplineTask
 
 Stage = tuple[int, int, float]
 
@@ -77,8 +77,12 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         barrier.workspace(count, degree), history,
     )  # fmt: skip
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT
-    outcome = finish(problem, task, times, status=status)
-    if outcome.status is Status.INFEASIBLE:  # the start may be feasible where the descent ended not
+    try:
+        outcome = finish(problem, task, times, status=status)
+        failed = outcome.status is Status.INFEASIBLE
+    except OutOfRange:
+        failed = True
+    if failed:  # the start may do where the descent ended badly
         outcome = finish(problem, task, start, status=Status.NO_PROGRESS)
     return replace(
         outcome,
