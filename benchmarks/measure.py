@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 BATCH = 0.02
 """Calls are repeated within a batch until it lasts so many seconds."""
+WARM = 5
+"""One part in so many of a batch is run beforehand, untimed."""
 BUDGET = 6.0
 """Seconds of one contender's rounds; what is slower gets fewer rounds, but two at least."""
 
@@ -60,6 +62,7 @@ def side_by_side(contenders: Sequence[Callable[[int], object]], rounds: int) -> 
         for _ in range(rounds):
             for times, contender, count in zip(found, contenders, counts, strict=True):
                 if len(times) < 2 or sum(times) * count < BUDGET:
+                    contender(count // WARM)  # others have emptied the caches
                     times.append(_time(contender, count) / count)
     return [Sample(tuple(times)) for times in found]
 

@@ -67,6 +67,8 @@ def through_json(value):
         ({"speed": -1.0}, "limit speed is -1; it must be positive and finite"),
         ({"jerk": NAN}, "limit jerk is nan; it must be positive and finite"),
         ({"snap": math.inf}, "limit snap is inf; it must be positive and finite"),
+        ({"speed": 1e-7}, "limit speed is 1e-07; it must be from 1e-06 to 1e\\+09"),
+        ({"jerk": 2e9}, "limit jerk is 2e\\+09; it must be from 1e-06 to 1e\\+09"),
         ({"speed": "fast"}, "limit speed is 'fast'; it must be a number"),
         ({"speed": [1, 2]}, r"limit speed is \[1, 2\]; it must be a number"),
         (
@@ -102,11 +104,11 @@ def test_unknown_limits_are_named():
             {"velocity": 5.0})  # fmt: skip
 
 
-positive = st.floats(1e-300, 1e300)
+positive = st.floats(1e-6, 1e9)
 LIMIT_VALUES = {
-    "thrust_acceleration": st.floats(GRAVITY, 1e300, exclude_min=True),
-    "tilt": st.floats(1e-300, math.pi / 2, exclude_max=True),
-    "least_thrust_acceleration": st.floats(1e-300, GRAVITY, exclude_max=True),
+    "thrust_acceleration": st.floats(GRAVITY, 1e9, exclude_min=True),
+    "tilt": st.floats(1e-6, math.pi / 2, exclude_max=True),
+    "least_thrust_acceleration": st.floats(1e-6, GRAVITY, exclude_max=True),
 }
 limits_strategy = st.fixed_dictionaries(
     {"speed": positive},
@@ -240,6 +242,10 @@ def test_classes_refuse(arguments, message):
             r"waypoint 3 repeats waypoint 2 \(1, 2, 1.5\); merge them first \(peakflight.tidy",
         ),
         ({"limits": {"speed": 5.0}}, r"limits is \{'speed': 5.0\}; it must be a peakflight.Limits"),
+        (
+            {"limits": Limits(tilt=0.5, least_thrust_acceleration=3.0)},
+            "none of the limits speed, thrust_acceleration, jerk, snap is set; set at least one",
+        ),
         ({"minimize": "comfort"}, "minimize names 'comfort'"),
         ({"degree": 1}, "degree is 1; it must be 3 to 11"),
         ({"continuity": 9}, "continuity is 9; degree 5 allows 0 to 4"),

@@ -52,8 +52,8 @@ class Limits:
     Raises
     ------
     InvalidProblem
-        If a value is not a positive finite number, breaks the rule beside its field, or if no
-        limit bounds how fast the flight can be.
+        If a value is not a positive finite number, breaks the rule beside its field, or if none
+        is set.
     """
 
     speed: float | None = None
@@ -89,11 +89,8 @@ class Limits:
                 f"limit least_thrust_acceleration is {least:g} m/s^2; it must be below gravity "
                 f"({GRAVITY} m/s^2), or the vehicle cannot hover"
             )
-        if all(getattr(self, name) is None for name in BOUNDING):
-            raise InvalidProblem(
-                f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
-                "bounds how fast the flight can be"
-            )
+        if not self.active:
+            raise InvalidProblem("no limit is set; set at least one, such as speed=5.0")
 
     @property
     def active(self) -> tuple[LimitKind, ...]:

@@ -99,6 +99,10 @@ def _tidied(
     course, notes = tidy(
         Course(as_float_array("waypoints", waypoints, (None, 3)), yaw=options.pop("yaw", None))
     )
+    if notes and options.get("derivatives"):
+        raise InvalidProblem(
+            f"{notes[0]}, but derivatives name waypoints by number; merge first (peakflight.tidy)"
+        )
     unknown = set(options) - set(Problem.__dataclass_fields__)
     if unknown:
         raise InvalidProblem(f"unknown option {min(unknown)!r}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
-from peakflight.limits import Limits
+from peakflight.limits import BOUNDING, Limits
 
 DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
 """Names of the derivatives of position, by order."""
@@ -141,6 +141,15 @@ class Problem:
         object.__setattr__(self, "waypoints", waypoints)
         if not isinstance(self.limits, Limits):
             raise InvalidProblem(f"limits is {self.limits!r}; it must be a peakflight.Limits")
+        if all(getattr(self.limits, name) is None for name in BOUNDING):
+            raise InvalidProblem(
+                f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
+                "bounds how fast the flight can be"
+            )
+        if isinstance(self.minimize, Mapping):
+            object.__setattr__(self, "minimize", dict(self.minimize))
+        elif not isinstance(self.minimize, str):
+            object.__setattr__(self, "minimize", tuple(self.minimize))
         spline_class = SplineClass.of(
             self.minimize, self.degree, self.continuity, inner=bool(self.derivatives)
         )
@@ -285,7 +294,13 @@ def fixed_state(
     if isinstance(state, Mapping):
         rows = {_order(name, key): value for key, value in state.items()}
     else:
-        array = as_float_array(name, [[_number(x) for x in row] for row in state], (None, axes))  # type: ignore[union-attr]
+        try:
+            numbers = [[_number(x) for x in row] for row in state]  # type: ignore[union-attr]
+        except TypeError:
+            raise InvalidProblem(
+                f"{name} is {state!r}; it must be rows of {axes} numbers"
+            ) from None
+        array = as_float_array(name, numbers or np.empty((0, axes)), (None, axes))
         rows = dict(enumerate(array, start=1))
     count = max([zeros, *rows])
     if count >= degree:

@@ -1,5 +1,6 @@
 """A piecewise polynomial in time, as a closed value type."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,6 +60,8 @@ class Trajectory:
         object.__setattr__(self, "coefficients", coefficients)
         object.__setattr__(self, "segment_times", segment_times)
         object.__setattr__(self, "start_time", float(self.start_time))
+        if not math.isfinite(self.start_time):
+            raise InvalidProblem(f"start_time is {self.start_time}; it must be finite")
 
     def __len__(self) -> int:
         """Number of pieces, K."""
@@ -219,6 +222,8 @@ class Trajectory:
 
     def stretch(self, factor: float) -> Self:
         """The same path flown slower by `factor` (faster below 1), from the same start time."""
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise ValueError(f"factor is {factor}; it must be positive and finite")
         powers = float(factor) ** -np.arange(self.degree + 1.0)
         return type(self)(
             self.coefficients * powers[:, None], self.segment_times * factor, self.start_time

@@ -223,7 +223,7 @@ def _clear(weights, vertical, count):
 def _count_above(values, count, bound):
     above = 0  # a count is quick where a maximum is not: integers can be added in any order
     for q in range(count):
-        above += 1 if values[q] > bound else 0
+        above += 0 if values[q] <= bound else 1  # NaN counts as above
     return above
 
 

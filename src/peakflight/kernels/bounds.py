@@ -32,8 +32,10 @@ UNBOUNDED = 1e9
 """Kappa where no bound exists, as for least thrust in free fall."""
 EXCESS = 1e-9
 """A stretched trajectory may keep this much less than its limits allow, relative."""
-ROUNDS = 40
+ROUNDS = 200
 """Most rounds of the search for a uniform stretch; two or three are usual."""
+LONGEST = 1e30
+"""No stretch is longer than this."""
 
 
 @lru_cache
@@ -110,6 +112,7 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
     original = coefficients.copy()
     durations = times.copy()
     factor = 1.0
+    infeasible = 0.0  # the largest factor that is known not to do
     best = np.inf
     for _ in range(ROUNDS):
         certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place)
@@ -120,22 +123,29 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
                 if limits[kind] > 0.0:
                     if not upper[k, kind] <= 1.0:
                         feasible = False
+                    at = place[k, kind]
                     needed = max(
                         needed,
-                        _needed(kind, coefficients, k, times[k], place[k, kind], limits, gravity,
-                                tables[2]),
-                    )  # fmt: skip
+                        _needed(kind, coefficients, k, times[k], at, limits, gravity, tables[2]),
+                    )
         if feasible:
             best = min(best, factor)
-            if needed >= 1.0 - EXCESS:
-                break
-        if not (0.0 < needed < np.inf):
+        else:
+            infeasible = max(infeasible, factor)
+        if best <= infeasible * (1.0 + EXCESS) or (feasible and needed >= 1.0 - EXCESS):
             break
-        if feasible and best < np.inf and factor > best:
-            break  # going faster broke a limit elsewhere, and coming back ended higher: enough
-        # a violation that only the bound sees is closed by the tolerance itself
-        needed = max(needed, 1.0 + 2.0 * tolerance) if not feasible else needed
+        # The worst sample tells the next factor, to the last bit if it stays the worst. A violation
+        # that only the bound sees is closed by the tolerance itself.
+        if not feasible and needed > 1.0 - 2.0 * tolerance:
+            needed = max(needed, 1.0 + 2.0 * tolerance)
         factor *= needed * (1.0 + 4.0 * EPSILON)
+        if not infeasible < factor < best:  # it tells nothing: search by itself
+            if best < np.inf:
+                factor = np.sqrt(max(infeasible, 1e-3 * best) * best)
+            else:
+                factor = 2.0 * infeasible
+        if not factor < LONGEST:
+            break
         _rescale(original, durations, factor, coefficients, times)
     if best == np.inf:
         return np.nan
