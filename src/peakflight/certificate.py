@@ -15,8 +15,10 @@ from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import DERIVATIVE_NAMES, Problem, as_float_array
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
+JUMP_OF_LIMIT = 1e-4
+"""A derivative that is limited may jump by this part of its limit, for rounding in short pieces."""
 TOLERANCE = 1e-10
 """Relative distance between the certified bound of a squared norm and an attained value."""
 
@@ -56,20 +58,26 @@ def certify(
     _check_axes(trajectory)
     coefficients = fresh(trajectory.coefficients)
     times = fresh(trajectory.segment_times)
-    upper, _, _ = _bound(coefficients, times, limits)
+    upper = _bound(coefficients, times, limits)
     if waypoints is None:
         points, firsts = coefficients[:1, 0], np.zeros(0, dtype=np.int64)
     else:
         legs = len(times) if pieces is None else len(pieces)
         counts = np.ones(legs, dtype=np.int64) if pieces is None else np.array(pieces)
-        if counts.sum() != len(times):
-            raise InvalidProblem(f"pieces add up to {counts.sum()}; there are {len(times)}")
+        whole = np.issubdtype(counts.dtype, np.integer) and counts.ndim == 1
+        if not (whole and (counts >= 1).all() and counts.sum() == len(times)):
+            raise InvalidProblem(
+                f"pieces must be whole numbers from 1 that add up to the {len(times)} segments"
+            )
         points = fresh(as_float_array("waypoints", waypoints, (legs + 1, 3)))
         firsts = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
     smooth = 2 if continuity is None else continuity
+    if smooth < 0:
+        raise InvalidProblem(f"continuity is {smooth}; it must be 0 or more")
     jump, joint, order, miss, waypoint = joints.residuals(
-        coefficients, times, smooth, bounds.falling_factorials(trajectory.degree), points, firsts
-    )
+        coefficients, times, smooth, bounds.falling_factorials(trajectory.degree), points, firsts,
+        _jump_caps(limits, smooth), JOINT_TOLERANCE,
+    )  # fmt: skip
     peaks = {
         kind.name: upper[:, index]
         for index, kind in enumerate(KINDS)
@@ -139,7 +147,7 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
         coefficients, times, limits.as_array(), GRAVITY, _tables(trajectory.degree), TOLERANCE,
         np.empty(shape), np.empty(shape), np.empty(shape),
     )  # fmt: skip
-    if not np.isfinite(factor):
+    if not (np.isfinite(factor) and times.min() >= SHORTEST and times.max() <= LONGEST):
         return None
     return Trajectory(coefficients, times, trajectory.start_time), float(factor)
 
@@ -147,20 +155,17 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
 def peak_ratios(trajectory: Trajectory, limits: Limits) -> np.ndarray:
     """(K, len(KINDS)) certified kappa (Eq. kapp_i, Eq. kappa2); NaN for limits that are not set."""
     _check_axes(trajectory)
-    upper, _, _ = _bound(fresh(trajectory.coefficients), fresh(trajectory.segment_times), limits)
-    return upper
+    return _bound(fresh(trajectory.coefficients), fresh(trajectory.segment_times), limits)
 
 
-def _bound(
-    coefficients: np.ndarray, times: np.ndarray, limits: Limits
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bound(coefficients: np.ndarray, times: np.ndarray, limits: Limits) -> np.ndarray:
     shape = (len(times), len(KINDS))
     upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
     bounds.certify(
         coefficients, times, limits.as_array(), GRAVITY, _tables(coefficients.shape[1] - 1),
         TOLERANCE, upper, lower, place,
     )  # fmt: skip
-    return upper, lower, place
+    return upper
 
 
 def _state_error(
@@ -181,6 +186,20 @@ def _state_error(
         coefficients, times, factorials, pieces, at_end, states
     )
     return float(error), indices[where], order
+
+
+def _jump_caps(limits: Limits, continuity: int) -> np.ndarray:
+    """(continuity+1,) jumps that no motion excuses: a part of the limit on that derivative.
+
+    What a derivative is large against in the time of a very short piece may be a great deal in
+    flight.
+    """
+    caps = np.full(continuity + 1, np.inf)
+    for kind in KINDS[:4]:
+        limit = getattr(limits, kind.name)
+        if limit is not None and kind.order <= continuity:
+            caps[kind.order] = JUMP_OF_LIMIT * limit
+    return caps
 
 
 def _derivative_name(order: int) -> str:

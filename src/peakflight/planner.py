@@ -68,7 +68,9 @@ def plan(
             f"(peakflight.methods.{method}.Settings)"
         )
     plain = is_plain(problem.waypoints, problem.spline_class, problem.fixed)
-    with jit.announced(f"{method}-{problem.degree}-{'plain' if plain else 'general'}", _log):
+    variant = getattr(settings, "variant", "only")
+    kernels = f"{method}-{variant}-{problem.degree}-{'plain' if plain else 'general'}"
+    with jit.announced(kernels, _log):
         impossible = _contradiction(problem)
         outcome = module.solve(problem, settings)
         report = certify_answer(problem, outcome.trajectory)

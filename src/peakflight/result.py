@@ -87,8 +87,8 @@ class History:
     segment_times: np.ndarray
     """(I, K) s."""
     kappa: np.ndarray | None = None
-    """(I, K, 4) peak ratios of speed, thrust acceleration, jerk and snap, where the method has
-    them; NaN for a limit that is not set."""
+    """(I, K, len(KINDS)) peak ratios, where the method has them; NaN for a limit that is not
+    set."""
 
     def __post_init__(self) -> None:
         object.__setattr__(

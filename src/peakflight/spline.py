@@ -17,7 +17,7 @@ from peakflight.kernels import basis, classical, general
 from peakflight.kernels.jit import fresh
 from peakflight.kernels.layout import make_cost, make_layout
 from peakflight.problem import SplineClass, StateLike, as_float_array, fixed_state
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
 REFINEMENTS = 3
 """Solves of a general spline with one factorisation; more change nothing at double precision."""
@@ -115,8 +115,8 @@ class SplineTask:
         if not pivot > SINGULAR:
             raise Undetermined(
                 f"the cost and what is fixed do not determine one trajectory (degree {degree}, "
-                f"continuity C{continuity}): fix less or more, weigh a lower derivative or raise "
-                "the degree"
+                f"continuity C{continuity}): fix less or more, ask for less continuity, weigh a "
+                "lower derivative or raise the degree"
             )
         return cls(spline_class, reference, None, (layout, cost, factors, values, starts))
 
@@ -153,7 +153,8 @@ class SplineTask:
                 data[:] = np.nan
         with np.errstate(all="ignore"):
             coefficients = coefficients_of(data, starts, times)
-        if not np.isfinite(coefficients).all():
+        computable = times.min() >= SHORTEST and times.max() <= LONGEST
+        if not (computable and np.isfinite(coefficients).all()):
             raise OutOfRange(
                 "the spline cannot be computed in double precision: legs and durations differ too "
                 f"much ({times.min():g} to {times.max():g} s) for degree {self.spline_class.degree}"

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 TIME_TOLERANCE = 1e-9
 """How far outside its interval a trajectory may be asked for, relative to its duration."""
 
+SHORTEST, LONGEST = 1e-9, 1e9
+"""Durations of a piece, s: beyond, its powers run out of digits."""
+LATEST = 1e10
+"""Start times, s: a Unix time is well within."""
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -30,7 +35,7 @@ class Trajectory:
     Raises
     ------
     InvalidProblem
-        If shapes do not fit, a time is not positive, or a number is not finite.
+        If shapes do not fit, a time is out of range, or a number is not finite.
     """
 
     coefficients: np.ndarray
@@ -48,11 +53,12 @@ class Trajectory:
                 f"coefficients have shape {coefficients.shape} and segment_times "
                 f"{segment_times.shape}; they must be (K, N+1, D) and (K,) with K, D at least 1"
             )
-        bad = ~(np.isfinite(segment_times) & (segment_times > 0.0))
+        bad = ~((segment_times >= SHORTEST) & (segment_times <= LONGEST))
         if bad.any():
             piece = int(bad.argmax())
             raise InvalidProblem(
-                f"segment {piece} lasts {segment_times[piece]} s; it must be positive and finite"
+                f"segment {piece} lasts {segment_times[piece]} s; it must be positive, from "
+                f"{SHORTEST:g} to {LONGEST:g} s"
             )
         if not np.isfinite(coefficients).all():
             piece = int(np.argwhere(~np.isfinite(coefficients))[0, 0])
@@ -60,8 +66,10 @@ class Trajectory:
         object.__setattr__(self, "coefficients", coefficients)
         object.__setattr__(self, "segment_times", segment_times)
         object.__setattr__(self, "start_time", float(self.start_time))
-        if not math.isfinite(self.start_time):
-            raise InvalidProblem(f"start_time is {self.start_time}; it must be finite")
+        if not abs(self.start_time) <= LATEST:
+            raise InvalidProblem(
+                f"start_time is {self.start_time}; it must be finite, within {LATEST:g} s of zero"
+            )
 
     def __len__(self) -> int:
         """Number of pieces, K."""

@@ -116,28 +116,30 @@ def evaluate(
 
 
 @inner
-def watch(rows, spline, times, limits, gravity, tables, doublings, work, watched):
-    """Watched (K, kinds) <- which limits come near enough to matter on which pieces.
+def watch(rows, times, limits, gravity, tables, doublings, work, watched):
+    """Look up which limits come near enough to matter on which pieces: watched (K, kinds).
 
-    tables: of BATCH samples. The higher the power, the less the times will change, and the nearer
-    a limit must be.
+    tables: of BATCH samples; the end data in `work` are those of `times`. The higher the power, the
+    less the times will change, and the nearer a limit must be. Returns how many limits are exceeded
+    that were not watched before.
     """
-    data, _, samples, squares, _, _, values, _, _kinds, orders = work
+    data, _, samples, squares, _, _, values, _, _, orders = work
     nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
-    if not solve_spline(rows, spline[0], spline[1], spline[2], times, data):
-        return
+    missed = 0
     for row in range(4):
         orders[row] = True
     for k in range(times.size):
         _sample(rows, data, k, times[k], tables, orders, samples.reshape(3, 4, 1, BATCH), 0)
         _square(samples, BATCH, orders, squares)
         for kind in range(EXPONENTS.size):
-            watched[k, kind] = False
             if limits[kind] > 0.0:
                 row = KIND_ORDERS[kind] - 1
                 measure(kind, samples, squares, BATCH, row, limits[kind], gravity, values)
+                if not watched[k, kind] and _count_above(values, BATCH, 1.0) > 0:
+                    missed += 1
                 bound = max(nearest, 0.0) ** EXPONENTS[kind]
                 watched[k, kind] = nearest <= 0.0 or _count_above(values, BATCH, bound) > 0
+    return missed
 
 
 @inner

@@ -71,9 +71,9 @@ def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
     """Certified kappa of every piece and kind.
 
     coefficients (K, N+1, 3), times (K,), limits as `Limits.as_array`; tables: of
-    `bernstein_tables` and `falling_factorials`; upper and lower (K, kinds) get the bound and a
-    value that is attained (NaN for kinds that are not limited), place (K, kinds) where, in
-    normalised time.
+    `bernstein_tables` and `falling_factorials`; upper and lower (K, kinds) get the bound and, but
+    for rounding, a value that is attained (NaN for kinds that are not limited), place (K, kinds)
+    where, in normalised time.
     """
     degree = coefficients.shape[1] - 1
     points = np.empty((degree + 1, 3))
@@ -209,10 +209,12 @@ def _quotient(
     """
     order = KIND_ORDERS[kind]
     gravity = gravity if order == 2 else 0.0
+    plain = kind not in (4, 5)
     degree, error = _control_points(
         coefficients, piece, time, order, gravity, tables[0], tables[2], points
     )
-    plain = kind not in (4, 5)
+    if not error < np.inf:  # overflow, or not a number
+        return 2 * degree, plain, False
     if kind == 5:  # 1 / |a + g e3|^2
         _square(points, 0, degree, error, tables[1], -1.0, denominators)
         for i in range(2 * degree + 1):
@@ -297,7 +299,7 @@ def _square(points, first, degree, error, product, sign, out):
             for d in range(first, 3):
                 dot += points[i, d] * points[j, d]
             out[0, i + j] += product[degree, i, j] * dot
-    rounding = (10 + 2 * degree + 8 * degree * DEPTH) * EPSILON
+    rounding = (10 + 2 * degree + 8 * degree * SPLITS) * EPSILON
     margin = 2.0 * error * np.sqrt(largest) + error * error + rounding * largest
     for i in range(2 * degree + 1):
         out[0, i] += sign * margin
@@ -334,8 +336,10 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
         if bound <= low + tolerance * abs(low):
             high = max(high, bound)
             continue
-        if waiting >= DEPTH or splits > SPLITS or np.isnan(bound):
-            high = bound if not bound <= high else high  # NaN stays
+        if np.isnan(bound):
+            return low, np.inf, place
+        if waiting >= DEPTH or splits > SPLITS:
+            high = max(high, bound)
             continue
         at = 0.5
         if splits < 8 and 0 < index < degree:

@@ -17,6 +17,10 @@ LINE_SEARCH = 30
 """Most evaluations in one line search."""
 CURVATURE = 1e-15
 """Pairs with less curvature than this, relative to the last, are not kept."""
+WATCH_EVERY = 8
+"""Iterations after which it is looked up again which limits matter."""
+REPEATS = 10
+"""How often a stage begins again because a limit that did not matter is exceeded."""
 PATIENCE = 5
 """A stage ends when so many iterations together gain less than its `decrease`."""
 
@@ -30,7 +34,7 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
     of the power, most iterations, relative decrease at which the stage ends; memory: pairs that
     L-BFGS keeps; history (rows, K) gets the times of the first iterations.
 
-    Returns iterations, evaluations and whether every stage met its own stopping rule.
+    Returns iterations and whether every stage met its own stopping rule.
     """
     count = times.size
     pairs = (
@@ -52,7 +56,6 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
     shrink = 0.0  # scale of the initial inverse Hessian, from the last pair
     power = 0.0
     iterations = 0
-    evaluations = 0
     converged = True
     for stage in range(stages.shape[0]):
         doublings = int(stages[stage, 0])
@@ -74,7 +77,9 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
             trial[k] = x[k]
         for k in range(count):
             diagonal[k] = reference / times[k]
-        watch(rows, spline, times, limits, gravity, dense, doublings, work, watched)
+        for k in range(count):
+            for kind in range(limits.size):
+                watched[k, kind] = limits[kind] > 0.0
         iteration = -1  # of this stage; the first evaluation is accepted as it is
         value = np.inf
         slope = 0.0
@@ -83,6 +88,8 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
         high = np.inf
         largest = 0.0
         searched = 0
+        repeats = 0
+        moved = True  # whether the last evaluation was taken
         while True:
             for k in range(count):
                 times[k] = np.exp(trial[k])
@@ -90,7 +97,6 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
                 rows, spline, times, limits, gravity, tables[stage], watched, doublings, reference,
                 work, trial_gradient,
             )  # fmt: skip
-            evaluations += 1
             if iteration >= 0:  # line search: halve or double until the weak Wolfe conditions hold
                 searched += 1
                 accepted = False
@@ -107,7 +113,8 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
                     for k in range(count):
                         trial[k] = x[k] + step * direction[k]
                     continue
-                if not trial_value < value:
+                moved = trial_value < value
+                if not moved:
                     if kept == 0:
                         break  # not even steepest descent finds anything lower
                     kept = none
@@ -122,19 +129,25 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
                     iterations += 1
                     iteration += 1
             else:
+                moved = True
                 if not trial_value < np.inf:
-                    return iterations, evaluations, False
+                    return iterations, False
                 for k in range(count):
                     gradient[k] = trial_gradient[k]
                 value = trial_value
                 iteration = 0
             values[iteration] = value
-            if iteration >= PATIENCE:
-                gain = values[iteration - PATIENCE] - value
-                if gain < decrease * count:
-                    break
-            if iteration == longest:
-                converged = False
+            stopping = iteration == longest or (
+                iteration >= PATIENCE and values[iteration - PATIENCE] - value < decrease * count
+            )
+            if moved and (stopping or iteration % WATCH_EVERY == 0):
+                missed = watch(rows, times, limits, gravity, dense, doublings, work, watched)
+                if missed > 0 and repeats < REPEATS:  # begin the stage again, from here
+                    repeats += 1
+                    iteration = -1
+                    continue
+            if stopping:
+                converged = converged and iteration < longest and repeats < REPEATS
                 break
             for attempt in range(2):
                 if attempt > 0:
@@ -155,7 +168,7 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
                 trial[k] = x[k] + step * direction[k]
         for k in range(count):
             times[k] = np.exp(x[k])
-    return iterations, evaluations, converged
+    return iterations, converged
 
 
 @inner

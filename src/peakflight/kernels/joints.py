@@ -6,11 +6,13 @@ from peakflight.kernels.jit import inner, kernel
 
 
 @kernel
-def residuals(coefficients, times, continuity, factorials, waypoints, firsts):
+def residuals(coefficients, times, continuity, factorials, waypoints, firsts, caps, tolerance):
     """Largest jump at the joints and largest miss of a waypoint.
 
-    continuity: derivatives 0..continuity should not jump; factorials (N+1, N+1): factor of
-    coefficient j in derivative s; waypoints (legs+1, D); firsts (legs,): first piece of each leg.
+    continuity: derivatives 0..continuity should not jump; factorials (., N+1): factor of
+    coefficient j in derivative s; waypoints (legs+1, D); firsts (legs,): first piece of each leg;
+    caps (continuity+1,): jump of each derivative that counts as `tolerance`, however large the
+    motion makes the derivative.
 
     Returns the largest jump of a derivative, relative to the size that the motion of the two
     pieces gives it, s! max_j |c_j h^j| / h^s over j >= 1; the joint (end of that piece) and the
@@ -31,11 +33,14 @@ def residuals(coefficients, times, continuity, factorials, waypoints, firsts):
                 _scale(coefficients, times, factorials, k, s),
                 _scale(coefficients, times, factorials, k + 1, s),
             )
-            if s == 0:  # a position is as exact as its coordinates
+            if s == 0:  # a position is as exact as its coordinates: 1e-12 of them, and a nanometre
+                scale = 0.1
                 for d in range(axes):
-                    scale = max(scale, abs(coefficients[k, 0, d]))
-            if np.sqrt(jump) > worst * scale:
-                worst = np.sqrt(jump) / scale if scale > 0.0 else np.inf
+                    scale = max(scale, 1e-4 * abs(coefficients[k, 0, d]))
+            error = np.sqrt(jump) / scale if 0.0 < scale < np.inf else np.sqrt(jump) / caps[s]
+            error = max(error, tolerance * (np.sqrt(jump) / caps[s]))
+            if not error <= worst:
+                worst = np.inf if np.isnan(error) else error
                 joint = k
                 order = s
     miss = 0.0

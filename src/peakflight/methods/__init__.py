@@ -44,6 +44,18 @@ class Method(Protocol):
         """Answer a problem."""
 
 
+def require(name: str, value: float, low: float, high: float) -> None:
+    """Check a setting.
+
+    Raises
+    ------
+    InvalidProblem
+        If it is not a number from `low` to `high`.
+    """
+    if not low <= value <= high:
+        raise InvalidProblem(f"setting {name} is {value!r}; it must be from {low:g} to {high:g}")
+
+
 def find(name: str) -> Method:
     """The module of a method.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from peakflight.certificate import peak_ratios
 from peakflight.errors import Status
-from peakflight.methods import Outcome
+from peakflight.methods import Outcome, require
 from peakflight.methods.scaling import estimated_stretch, finish, proportional_times
 from peakflight.problem import Problem
 from peakflight.result import History
@@ -41,6 +41,15 @@ class Algorithm1Settings:
     history_size: int = 1_000_000
     """Most segment times kept for the history, of all iterations together."""
 
+    def __post_init__(self) -> None:
+        require("learning_rate", self.learning_rate, 0.0, 1.0)
+        require("neighbour_rate", self.neighbour_rate, 0.0, 1.0)
+        require("band", self.band, 0.0, 1.0)
+        require("slack", self.slack, 0.0, 1.0)
+        require("start_duration", self.start_duration or 1.0, 1e-3, 1e6)
+        require("iterations", self.iterations, 1, 10**7)
+        require("history_size", self.history_size, 1, 10**9)
+
 
 def solve(problem: Problem, settings: Algorithm1Settings) -> Outcome:
     """Iterate to the paper's convergence rule; hand back the best iterate, made feasible.
@@ -57,32 +66,34 @@ def solve(problem: Problem, settings: Algorithm1Settings) -> Outcome:
     kept: list[np.ndarray] = []
     peaks: list[np.ndarray] = []
     best, shortest = times, np.inf
-    converged = False
+    converged = diverged = False
     iteration = 0
     while not converged and iteration < settings.iterations:
         iteration += 1
         ratios = peak_ratios(task.solve(times), problem.limits)
         if len(kept) < rows:
             kept.append(times)
-            peaks.append(ratios[:, :4])
+            peaks.append(ratios)
         kappa = np.nanmax(ratios, axis=1)
         bound = times.sum() * estimated_stretch(ratios)
         converged = bool((np.abs(kappa - 1.0) <= settings.band).all())
         if bound < shortest or converged:
             best, shortest = times, bound
         times = update_times(times, kappa, settings)
-        if not 1.0 / DIVERGED < times.sum() / first < DIVERGED:
+        diverged = not 1.0 / DIVERGED < times.sum() / first < DIVERGED
+        if diverged:
             break
     outcome = finish(problem, task, best)
     message = outcome.message
     if outcome.status is Status.SOLVED and not converged:
+        ended = "diverged after" if diverged else "did not meet its convergence rule in"
         message = (
-            f"Algorithm 1 did not meet its convergence rule in {iteration} iterations; this is "
-            "its best iterate, stretched to the limits"
+            f"Algorithm 1 {ended} {iteration} iterations; this is its best iterate, stretched to "
+            "the limits"
         )
     status = outcome.status
     if status is Status.SOLVED and not converged:
-        status = Status.ITERATION_LIMIT
+        status = Status.NO_PROGRESS if diverged else Status.ITERATION_LIMIT
     return Outcome(
         status=status,
         trajectory=outcome.trajectory,

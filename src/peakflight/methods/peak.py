@@ -17,7 +17,7 @@ from peakflight.certificate import peak_ratios
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import barrier, basis, descent
 from peakflight.limits import GRAVITY
-from peakflight.methods import Outcome, algorithm1
+from peakflight.methods import Outcome, algorithm1, require
 from peakflight.methods.algorithm1 import Algorithm1Settings
 from peakflight.methods.scaling import estimated_stretch, finish, proportional_times
 from peakflight.problem import Problem
@@ -35,6 +35,10 @@ LADDER: tuple[Stage, ...] = (
     (64, 6144, 7e-6),
 )
 """Starting at the power 6 is what makes the plain start safe; ending at 6144 leaves 1e-4."""
+
+VARIANTS = ("descent", "paper")
+STRETCHED = 2e-3
+"""A descent whose result must be slowed down by more than this has missed something."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,20 +59,29 @@ class Settings:
     paper: Algorithm1Settings = field(default_factory=Algorithm1Settings)
     """Learning rates and the rest of variant paper."""
 
+    def __post_init__(self) -> None:
+        if self.variant not in VARIANTS:
+            raise InvalidProblem(
+                f"unknown variant {self.variant!r}; known are {', '.join(VARIANTS)}"
+            )
+        require("stages of the ladder", len(self.ladder), 1, 100)
+        require("stage_iterations", self.stage_iterations, 1, 10**6)
+        require("memory", self.memory, 1, 1000)
+        require("history_size", self.history_size, 1, 10**9)
+        _stages(self.ladder, self.stage_iterations)
+
 
 def solve(problem: Problem, settings: Settings) -> Outcome:
     """Best segment times for the spline of the problem, feasible."""
     if settings.variant == "paper":
         return algorithm1.solve(problem, settings.paper)
-    if settings.variant != "descent":
-        raise InvalidProblem(f"unknown variant {settings.variant!r}; known are descent and paper")
     task = SplineTask.of(problem.waypoints, problem.spline_class, problem.fixed)
     times = proportional_times(problem)
     times *= estimated_stretch(peak_ratios(task.solve(times), problem.limits))
     start = times.copy()
     count, degree = len(times), task.spline_class.degree
     history = np.empty((max(settings.history_size // count, 1), count))
-    iterations, _, converged = descent.descend(
+    iterations, converged = descent.descend(
         task.rows, (task.waypoints, task.simple, task.layered), times,
         problem.limits.as_array(), GRAVITY,
         tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
@@ -79,6 +92,8 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT
     try:
         outcome = finish(problem, task, times, status=status)
+        if outcome.trajectory.duration > (1.0 + STRETCHED) * times.sum():
+            outcome = replace(outcome, status=Status.NO_PROGRESS)
         failed = outcome.status is Status.INFEASIBLE
     except OutOfRange:
         failed = True
@@ -96,11 +111,13 @@ def _stages(ladder: tuple[Stage, ...], iterations: int) -> np.ndarray:
     """(n, 3) doublings of the power, most iterations, decrease."""
     rows = []
     for index, (samples, power, decrease) in enumerate(ladder):
-        doublings = np.log2(power / barrier.BASE_POWER)
-        if samples not in (8, 16, 32, 64) or doublings != round(doublings):
+        doublings = np.log2(power / barrier.BASE_POWER) if power > 0 else np.nan
+        known = samples in (8, 16, 32, 64) and power >= 6 and doublings % 1.0 == 0.0
+        if not (known and 0.0 < decrease < 1.0):
             raise InvalidProblem(
-                f"stage {index} of the ladder has {samples} samples and power {power}; they must "
-                "be 8, 16, 32 or 64 and 24 times a power of two"
+                f"stage {index} of the ladder is {samples} samples, power {power}, decrease "
+                f"{decrease}; they must be 8, 16, 32 or 64; 24 times a power of two, from 6 on; "
+                "and between 0 and 1"
             )
         rows.append((doublings, iterations, decrease))
     return np.array(rows)

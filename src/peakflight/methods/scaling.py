@@ -52,8 +52,8 @@ def finish(
         return Outcome(
             status=Status.INFEASIBLE,
             trajectory=trajectory,
-            message="no scale of the segment times keeps every limit: "
-            "the fixed motion at a waypoint asks for more than the limits allow",
+            message="no scale of the segment times keeps every limit"
+            + ("" if problem.is_at_rest else " with the motion that is fixed at waypoints"),
         )
     return Outcome(status=status, trajectory=found)
 
