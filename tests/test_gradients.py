@@ -61,7 +61,8 @@ def call_evaluate(
 
 @kernel
 def call_watch(rows, spline, times, limits, gravity, tables, doublings, work, watched):
-    barrier.watch(rows, spline, times, limits, gravity, tables, doublings, work, watched)
+    barrier.solve_spline(rows, spline[0], spline[1], spline[2], times, work[0])
+    barrier.watch(rows, times, limits, gravity, tables, doublings, work, watched)
 
 
 @kernel
@@ -402,6 +403,25 @@ def test_gradient_of_the_barrier_for_other_splines(options, x):
     expected = central_differences(
         lambda times: barrier_of(task, times, limits, **call)[0], TIMES, 2e-4
     )
+    np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("aside", [0.0, 1e-14, 1e-12, 1e-9, 1e-3])
+def test_gradient_of_tilt_where_it_vanishes(aside):
+    """Straight up and down, or all but: the tilt has a kink at zero, the measure must not."""
+    waypoints = np.array([[0, 0, 0], [aside, 0, 2.0], [0, 0, 0.5], [0, aside, 3.0]])
+    spline_class = SplineClass.of("jerk")
+    rest = {k: fixed_state("state", None, 3, 5, zeros=2) for k in (0, 3)}
+    task = SplineTask.of(waypoints, spline_class, rest)
+    times = np.array([0.9, 0.8, 1.0])
+    limits = np.full(len(KINDS), NAN)
+    limits[NAMES.index("tilt")] = 1.2
+    call = {"doublings": 0, "samples": 16}
+    _, gradient = barrier_of(task, times, limits, **call)
+    expected = central_differences(
+        lambda times: barrier_of(task, times, limits, **call)[0], times, 1e-4
+    )
+    assert np.abs(expected).max() > 1.0  # falling faster than gravity: the limit pulls
     np.testing.assert_allclose(gradient, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 

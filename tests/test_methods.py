@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from peakflight import (
     GRAVITY,
+    KINDS,
     InvalidProblem,
     Limits,
     Plan,
@@ -472,12 +473,12 @@ def test_history_is_the_road_of_the_equations():
                 **JERK)  # fmt: skip
     times, kappa = made.history.segment_times, made.history.kappa
     assert len(made.history) == made.iterations == 25
-    assert kappa.shape == (25, 9, 4)
+    assert kappa.shape == (25, 9, len(KINDS))
     lengths = made.problem.leg_lengths
     np.testing.assert_allclose(times[0], 5.0 * lengths / lengths.sum(), rtol=1e-14)
     for i in range(24):
         np.testing.assert_array_equal(
-            times[i + 1], update_times(times[i], kappa[i].max(axis=1), tuned)
+            times[i + 1], update_times(times[i], np.nanmax(kappa[i], axis=1), tuned)
         )
     spline = minimum_effort_spline(waypoints, times[10])
     values = limited_values([spline.sample(2001, order) for order in range(1, 5)])
@@ -496,9 +497,9 @@ def test_algorithm_1_converges_by_its_rule_at_stated_rates(course, duration):
     tuned = paper(learning_rate=0.5, neighbour_rate=0.05, slack=0.01)
     made = check(plan(waypoints, method="peak", settings=tuned, **JERK))
     assert made.iterations < 100
-    last = made.history.kappa[-1].max(axis=1)
+    last = np.nanmax(made.history.kappa[-1], axis=1)
     assert (np.abs(last - 1.0) <= 0.05).all()  # the paper's [0.95, 1.05]
-    before = np.abs(made.history.kappa[:-1].max(axis=2) - 1.0).max(axis=1)
+    before = np.abs(np.nanmax(made.history.kappa[:-1], axis=2) - 1.0).max(axis=1)
     assert (before > 0.05).all()  # and it stops at once
     assert made.duration == pytest.approx(duration, rel=0.01)
     best = plan(waypoints, method="peak", **JERK).duration
@@ -525,7 +526,14 @@ def test_without_convergence_the_best_iterate_is_handed_back():
     assert "did not meet its convergence rule in 40 iterations" in made.message
     first = plan(waypoints, method="peak", settings=paper(iterations=1), **JERK)
     longer = plan(waypoints, method="peak", settings=paper(iterations=400), **JERK)
-    assert longer.duration <= made.duration <= first.duration
+    assert longer.duration <= made.duration < first.duration
+    candidates = [
+        stretch_to_limits(minimum_effort_spline(waypoints, times), JERK["limits"])[0].duration
+        for times in made.history.segment_times
+    ]
+    # the best is chosen by an estimate that takes gravity for part of the acceleration
+    assert min(candidates) <= made.duration <= 1.02 * min(candidates)
+    assert made.duration < 0.9 * max(candidates)
     assert first.duration == pytest.approx(
         plan(waypoints, method="proportional", **JERK).duration, rel=1e-8
     )
@@ -533,10 +541,10 @@ def test_without_convergence_the_best_iterate_is_handed_back():
 
 def test_a_learning_rate_that_diverges_still_ends_with_a_plan():
     waypoints = read_course(COURSES[0].parent / "tight_then_fast.json").waypoints
-    made = plan(waypoints, method="peak", settings=paper(learning_rate=50.0), **JERK)
+    made = plan(waypoints, method="peak", settings=paper(learning_rate=1.0), **JERK)
     assert made.feasible
-    assert made.status is Status.ITERATION_LIMIT
-    assert made.iterations < 2000
+    assert made.status in (Status.ITERATION_LIMIT, Status.NO_PROGRESS)
+    print(made.status, made.message, made.iterations)
 
 
 def test_the_start_and_the_size_of_the_history_are_open():
@@ -544,7 +552,7 @@ def test_the_start_and_the_size_of_the_history_are_open():
     made = plan(waypoints, method="peak", **JERK,
                 settings=paper(start_duration=None, history_size=9 * 7, iterations=30))  # fmt: skip
     assert made.history.segment_times.shape == (7, 9)
-    assert made.history.kappa.shape == (7, 9, 4)
+    assert made.history.kappa.shape == (7, 9, len(KINDS))
     np.testing.assert_allclose(
         made.history.segment_times[0], made.problem.leg_lengths / 5.0, rtol=1e-14
     )
@@ -587,16 +595,35 @@ def test_stopping_early_is_said_and_feasible():
 
 
 @pytest.mark.parametrize(
-    ("ladder", "message"),
+    ("changes", "message"),
     [
-        (((8, 24, 1e-2), (10, 96, 1e-3)), "stage 1 of the ladder has 10 samples and power 96;"),
-        (((8, 25, 1e-2),), "stage 0 of the ladder has 8 samples and power 25; they must be 8, 16"),
-        (((128, 24, 1e-2),), "stage 0 of the ladder has 128 samples and power 24"),
+        ({"variant": "papers"}, "unknown variant 'papers'; known are descent, paper"),
+        ({"ladder": ()}, "setting stages of the ladder is 0; it must be from 1 to 100"),
+        ({"ladder": ((8, 24, 1e-2), (10, 96, 1e-3))}, "stage 1 of the ladder is 10 samples, power"),
+        ({"ladder": ((8, 25, 1e-2),)}, "stage 0 of the ladder is 8 samples, power 25, .* 24 times"),
+        ({"ladder": ((8, 3, 1e-2),)}, "stage 0 of the ladder is 8 samples, power 3, .* from 6 on"),
+        ({"ladder": ((128, 24, 1e-2),)}, "stage 0 of the ladder is 128 samples"),
+        ({"ladder": ((8, 24, 0.0),)}, "stage 0 of the ladder .* decrease 0.0; .* between 0 and 1"),
+        ({"stage_iterations": 0}, "setting stage_iterations is 0; it must be from 1 to"),
+        ({"memory": 0}, "setting memory is 0; it must be from 1 to 1000"),
+        ({"history_size": -1}, "setting history_size is -1; it must be from 1 to"),
     ],
 )
-def test_ladders_that_kernels_cannot_climb_are_refused(ladder, message):
-    with pytest.raises(InvalidProblem, match=message):
-        plan(np.eye(3), method="peak", settings=peak.Settings(ladder=ladder), **JERK)
+def test_settings_of_peak_are_checked(changes, message):
+    with pytest.raises(InvalidProblem, match=f"^{message}"):
+        peak.Settings(**changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("learning_rate", 1.5), ("neighbour_rate", -0.1), ("band", math.nan), ("slack", -1e-3),
+        ("start_duration", -5.0), ("iterations", 0), ("history_size", 0),
+    ],
+)  # fmt: skip
+def test_settings_of_algorithm_1_are_checked(name, value):
+    with pytest.raises(InvalidProblem, match=f"^setting {name} is {value}; it must be from"):
+        Algorithm1Settings(**{name: value})
 
 
 def test_a_rougher_ladder_ends_near_the_best():
@@ -606,11 +633,6 @@ def test_a_rougher_ladder_ends_near_the_best():
     best = plan(waypoints, method="peak", **JERK)
     assert best.duration <= rough.duration * (1.0 + 1e-4)
     assert rough.duration <= 1.02 * best.duration
-
-
-def test_unknown_variants_are_refused():
-    with pytest.raises(InvalidProblem, match="unknown variant 'papers'; known are descent and"):
-        plan(np.eye(3), method="peak", settings=peak.Settings(variant="papers"), **JERK)
 
 
 # ---- proportional ---------------------------------------------------------------------------

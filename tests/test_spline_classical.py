@@ -353,7 +353,7 @@ def test_ten_thousand_legs_of_very_different_durations(degree):
     missed = np.abs(found.at(np.arange(10_000), times) - waypoints[1:]).max(axis=1)
     # a long leg between short ones swings far out: its end is a sum of terms that large
     assert (missed <= 1e-13 * (motion_sizes(found) + np.abs(waypoints).max())).all()
-    report = certify(found, Limits(speed=1.0), waypoints=waypoints, continuity=degree - 1)
+    report = certify(found, Limits(tilt=1.0), waypoints=waypoints, continuity=degree - 1)
     assert report.joint_residual <= 1e-8
     # both measure the same jumps, each with rounding of its own
     assert report.joint_residual == pytest.approx(joint_jumps(found, degree - 1), rel=0.5)

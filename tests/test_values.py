@@ -455,9 +455,10 @@ def assert_same_motion(a, b, tolerance=1e-12):
         ((np.ones((2, 3, 1)), [1.0]), r"coefficients have shape \(2, 3, 1\) and segment_times \(1"),
         ((np.ones((0, 3, 1)), []), r"coefficients have shape \(0, 3, 1\)"),
         ((np.ones((1, 3, 0)), [1.0]), r"coefficients have shape \(1, 3, 0\)"),
-        ((np.ones((2, 3, 1)), [1.0, 0.0]), "segment 1 lasts 0.0 s; it must be positive and finite"),
+        ((np.ones((2, 3, 1)), [1.0, 0.0]), "segment 1 lasts 0.0 s; it must be positive"),
         ((np.ones((2, 3, 1)), [-1.0, 1.0]), "segment 0 lasts -1.0 s; it must be positive"),
         ((np.ones((2, 3, 1)), [1.0, NAN]), "segment 1 lasts nan s; it must be positive"),
+        ((np.ones((2, 3, 1)), [1.0, 1e-10]), "segment 1 lasts 1e-10 s; .* from 1e-09 to 1e\\+09 s"),
         ((np.ones((2, 3, 1)), [1.0, math.inf]), "segment 1 lasts inf s; it must be positive"),
         (([[[1.0]], [[NAN]]], [1.0, 1.0]), "segment 1 has a coefficient that is not finite"),
         (([[[math.inf]], [[1.0]]], [1.0, 1.0]), "segment 0 has a coefficient that is not finite"),
@@ -731,6 +732,7 @@ def some_report(**changes):
         "peaks": {"speed": [0.5, 1.0, 0.2], "snap": [0.9, 0.3, 1.5]},
         "joint_residual": 1e-12,
         "waypoint_error": 0.25,
+        "state_error": 1e-13,
         "problems": ["snap reaches 1.5 times its limit", "waypoint 1 is missed"],
     }
     return Report(**(values | changes))
@@ -772,9 +774,9 @@ def test_a_report_is_frozen_and_shares_nothing():
 def test_reports_through_json(feasible, peaks, residual, problems):
     report = some_report(feasible=feasible, peaks=peaks, joint_residual=residual, problems=problems)
     copy = Report.from_dict(through_json(report))
-    assert (copy.feasible, copy.joint_residual, copy.waypoint_error, copy.problems) == (
-        report.feasible, report.joint_residual, report.waypoint_error, report.problems,
-    )  # fmt: skip
+    for field in dataclasses.fields(Report):
+        if field.name != "peaks":
+            assert getattr(copy, field.name) == getattr(report, field.name)
     assert list(copy.peaks) == list(report.peaks)
     for name in report.peaks:
         np.testing.assert_array_equal(copy.peaks[name], report.peaks[name])

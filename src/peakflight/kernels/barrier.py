@@ -126,19 +126,21 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     data, _, samples, squares, _, _, values, _, _, orders = work
     nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
     missed = 0
+    count = values.size  # BATCH, but not as a literal, for which callees compile once more
+    place = np.int64(0)
     for row in range(4):
         orders[row] = True
     for k in range(times.size):
-        _sample(rows, data, k, times[k], tables, orders, samples.reshape(3, 4, 1, BATCH), 0)
-        _square(samples, BATCH, orders, squares)
+        _sample(rows, data, k, times[k], tables, orders, samples.reshape(3, 4, 1, count), place)
+        _square(samples, count, orders, squares)
         for kind in range(EXPONENTS.size):
             if limits[kind] > 0.0:
                 row = KIND_ORDERS[kind] - 1
-                measure(kind, samples, squares, BATCH, row, limits[kind], gravity, values)
-                if not watched[k, kind] and _count_above(values, BATCH, 1.0) > 0:
+                measure(kind, samples, squares, count, row, limits[kind], gravity, values)
+                if not watched[k, kind] and _count_above(values, count, 1.0) > 0:
                     missed += 1
                 bound = max(nearest, 0.0) ** EXPONENTS[kind]
-                watched[k, kind] = nearest <= 0.0 or _count_above(values, BATCH, bound) > 0
+                watched[k, kind] = nearest <= 0.0 or _count_above(values, count, bound) > 0
     return missed
 
 
@@ -161,7 +163,8 @@ def solve_spline(rows, waypoints, simple, layered, times, data):
         pass
     else:
         layout, cost, factors, values, starts = layered
-        code = general.solve(layout, cost, waypoints, times, 1, factors, values, data, starts)
+        rounds = np.int64(1)
+        code = general.solve(layout, cost, waypoints, times, rounds, factors, values, data, starts)
         solved = code == 0
     return solved
 

@@ -24,6 +24,8 @@ KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
 EPSILON = 2.220446049250313e-16
 DEPTH = 24
 """Intervals that wait at any one time; beyond, the hull of an interval is taken as it is."""
+NESTING = 40
+"""Subdivisions of subdivisions; an interval is then 1e-12 long, or the margin would grow."""
 SPLITS = 400
 """Subdivisions of one polynomial, likewise."""
 NEWTON = 5
@@ -79,7 +81,7 @@ def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
     points = np.empty((degree + 1, 3))
     numerators = np.empty((DEPTH + 3, 2 * degree + 1))
     denominators = np.empty((DEPTH + 3, 2 * degree + 1))
-    ends = np.empty((DEPTH + 3, 2))
+    ends = np.empty((DEPTH + 3, 3))
     for k in range(times.size):
         for kind in range(limits.size):
             upper[k, kind] = np.nan
@@ -134,6 +136,8 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
             infeasible = max(infeasible, factor)
         if best <= infeasible * (1.0 + EXCESS) or (feasible and needed >= 1.0 - EXCESS):
             break
+        if feasible and needed <= 0.0:
+            break  # nothing moves
         # The worst sample tells the next factor, to the last bit if it stays the worst. A violation
         # that only the bound sees is closed by the tolerance itself.
         if not feasible and needed > 1.0 - 2.0 * tolerance:
@@ -299,7 +303,7 @@ def _square(points, first, degree, error, product, sign, out):
             for d in range(first, 3):
                 dot += points[i, d] * points[j, d]
             out[0, i + j] += product[degree, i, j] * dot
-    rounding = (10 + 2 * degree + 8 * degree * SPLITS) * EPSILON
+    rounding = (10 + 2 * degree + 8 * degree * NESTING) * EPSILON
     margin = 2.0 * error * np.sqrt(largest) + error * error + rounding * largest
     for i in range(2 * degree + 1):
         out[0, i] += sign * margin
@@ -324,6 +328,7 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
     splits = 0
     ends[0, 0] = 0.0
     ends[0, 1] = 1.0
+    ends[0, 2] = 0.0
     while waiting > 0:
         waiting -= 1
         bound = -np.inf
@@ -338,7 +343,7 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
             continue
         if np.isnan(bound):
             return low, np.inf, place
-        if waiting >= DEPTH or splits > SPLITS:
+        if waiting >= DEPTH or splits > SPLITS or ends[waiting, 2] >= NESTING:
             high = max(high, bound)
             continue
         at = 0.5
@@ -353,6 +358,8 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
         ends[waiting + 1, 0] = ends[waiting, 0]
         ends[waiting + 1, 1] = middle
         ends[waiting, 0] = middle
+        ends[waiting, 2] += 1.0
+        ends[waiting + 1, 2] = ends[waiting, 2]
         value = _at_end(numerators, denominators, plain, waiting, 0)
         if value > low and value < np.inf:
             low = value

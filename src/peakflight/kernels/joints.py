@@ -33,8 +33,8 @@ def residuals(coefficients, times, continuity, factorials, waypoints, firsts, ca
                 _scale(coefficients, times, factorials, k, s),
                 _scale(coefficients, times, factorials, k + 1, s),
             )
-            if s == 0:  # a position is as exact as its coordinates: 1e-12 of them, and a nanometre
-                scale = 0.1
+            if s == 0:  # a position is as exact as its coordinates: 1e-12 of them, or 1 nm
+                scale = max(scale, 0.1)
                 for d in range(axes):
                     scale = max(scale, 1e-4 * abs(coefficients[k, 0, d]))
             error = np.sqrt(jump) / scale if 0.0 < scale < np.inf else np.sqrt(jump) / caps[s]

@@ -21,6 +21,8 @@ KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
 """The derivative that each kind is about."""
 TINY = 1e-150
 """Added to what is divided by: a sample at rest has measure zero and slope zero."""
+ROUNDNESS = 1e-5
+"""Least horizontal acceleration, as a part of gravity, that tilt knows: no kink when upright."""
 SOFTNESS = 1e-3
 """How early, as a part of gravity, the measure of tilt bends on its way to zero."""
 
@@ -105,7 +107,8 @@ def _tilt(samples, count, row, limit, gravity, values):
     for q in range(count):
         x = samples[0, row, q]
         y = samples[1, row, q]
-        excess = np.sqrt(x * x + y * y) * cotangent - samples[2, row, q]
+        horizontal = np.sqrt(x * x + y * y + (ROUNDNESS * gravity) ** 2)
+        excess = horizontal * cotangent - samples[2, row, q]
         root = np.sqrt(excess * excess + (SOFTNESS * gravity) ** 2)
         values[q] = 0.5 * (excess + root) / gravity
 
@@ -117,7 +120,7 @@ def _add_tilt(samples, count, row, limit, gravity, grown, weights, vertical):
         x = samples[0, row, q]
         y = samples[1, row, q]
         z = samples[2, row, q]
-        horizontal = np.sqrt(x * x + y * y + TINY)
+        horizontal = np.sqrt(x * x + y * y + (ROUNDNESS * gravity) ** 2)
         excess = horizontal * cotangent - z
         root = np.sqrt(excess * excess + (SOFTNESS * gravity) ** 2)
         push = 0.5 * grown[q] / root  # d(log m) = d(excess) / root
