@@ -1,4 +1,4 @@
-"""The paper's Algorithm 1 to the letter, at three pairs of learning rates, beside the best times."""
+"""The paper's Algorithm 1 to the letter, at three pairs of rates, beside the best times."""
 
 from pathlib import Path
 

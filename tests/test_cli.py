@@ -602,8 +602,8 @@ class TestCheck:
     def test_another_degree(self, run: Run, plan_file: Path) -> None:
         edit(plan_file, degree=7)
         result = run("check", plan_file)
-        assert result.exit_code == 1
-        assert "claims degree 7, the coefficients have 5" in result.stderr
+        assert result.exit_code == 2
+        assert "degree is 7; the coefficients have 5" in result.stderr
 
     def test_a_plan_that_claims_too_little(self, run: Run, plan_file: Path) -> None:
         edit(plan_file, feasible=False, status="infeasible")

@@ -539,12 +539,11 @@ def test_without_convergence_the_best_iterate_is_handed_back():
     )
 
 
-def test_a_learning_rate_that_diverges_still_ends_with_a_plan():
+def test_a_learning_rate_that_is_too_large_still_ends_with_a_plan():
     waypoints = read_course(COURSES[0].parent / "tight_then_fast.json").waypoints
     made = plan(waypoints, method="peak", settings=paper(learning_rate=1.0), **JERK)
     assert made.feasible
-    assert made.status in (Status.ITERATION_LIMIT, Status.NO_PROGRESS)
-    print(made.status, made.message, made.iterations)
+    assert made.status is Status.ITERATION_LIMIT
 
 
 def test_the_start_and_the_size_of_the_history_are_open():
@@ -618,7 +617,7 @@ def test_settings_of_peak_are_checked(changes, message):
     ("name", "value"),
     [
         ("learning_rate", 1.5), ("neighbour_rate", -0.1), ("band", math.nan), ("slack", -1e-3),
-        ("start_duration", -5.0), ("iterations", 0), ("history_size", 0),
+        ("start_duration", -5.0), ("start_duration", 0.0), ("iterations", 0), ("history_size", 0),
     ],
 )  # fmt: skip
 def test_settings_of_algorithm_1_are_checked(name, value):

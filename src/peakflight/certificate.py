@@ -94,6 +94,9 @@ def certify(
         if not miss <= tolerance:
             problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
     state_error = 0.0
+    for index in fixed or ():
+        if waypoints is None or not 0 <= index <= len(firsts):
+            raise InvalidProblem(f"motion is fixed at waypoint {index}, which is not given")
     if fixed:
         state_error, index, order = _state_error(coefficients, times, firsts, fixed)
         if not state_error <= JOINT_TOLERANCE:

@@ -90,9 +90,6 @@ def _false_claims(values: Mapping[str, Any], plan: Plan, report: Report) -> tupl
     if not _agrees(duration, plan.duration):
         claim = json.dumps(duration)[:LONGEST_QUOTE]
         lines.append(f"claims a duration of {claim} s, the segments take {plan.duration:.9g} s")
-    if values["degree"] != plan.trajectory.degree:
-        claim = json.dumps(values["degree"])[:LONGEST_QUOTE]
-        lines.append(f"claims degree {claim}, the coefficients have {plan.trajectory.degree}")
     claimed = plan.report.peaks
     for name, proven in report.peaks.items():
         if name not in claimed:
