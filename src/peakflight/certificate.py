@@ -13,7 +13,7 @@ from peakflight.errors import InvalidProblem
 from peakflight.kernels import bounds, joints
 from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
-from peakflight.problem import DERIVATIVE_NAMES, Problem, as_float_array
+from peakflight.problem import Problem, as_float_array, derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
@@ -86,7 +86,7 @@ def certify(
     problems = _exceeded(peaks, limits)
     if not jump <= JOINT_TOLERANCE:
         problems.append(
-            f"{_derivative_name(order)} jumps at the end of segment {joint}, by {jump:.1e} of its "
+            f"{derivative_name(order)} jumps at the end of segment {joint}, by {jump:.1e} of its "
             "size there"
         )
     if waypoints is not None:
@@ -101,7 +101,7 @@ def certify(
         state_error, index, order = _state_error(coefficients, times, firsts, fixed)
         if not state_error <= JOINT_TOLERANCE:
             problems.append(
-                f"{_derivative_name(order)} at waypoint {index} is not the one that is fixed there"
+                f"{derivative_name(order)} at waypoint {index} is not the one that is fixed there"
             )
     return Report(
         feasible=not problems,
@@ -203,10 +203,6 @@ def _jump_caps(limits: Limits, continuity: int) -> np.ndarray:
         if limit is not None and kind.order <= continuity:
             caps[kind.order] = JUMP_OF_LIMIT * limit
     return caps
-
-
-def _derivative_name(order: int) -> str:
-    return DERIVATIVE_NAMES[order] if order < len(DERIVATIVE_NAMES) else f"derivative {order}"
 
 
 def _tables(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

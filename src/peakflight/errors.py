@@ -19,6 +19,15 @@ class MissingExtra(PeakflightError, ImportError):
     """An optional library is not installed; the message names the extra that brings it."""
 
 
+LONGEST_QUOTE = 40
+"""Characters of a wrong value that a message shows."""
+
+
+def quoted(text: str) -> str:
+    """Text from a user as a message shows it: in quotes, on one line, and not too long."""
+    return repr(text) if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]!r}..."
+
+
 class Status(StrEnum):
     """How a solve ended. A plan is feasible exactly when its report says so, whatever the status.
 

@@ -29,7 +29,7 @@ def read_text(path: PathLike) -> str:
     except UnicodeDecodeError as error:
         raise InvalidFile(f"{path}: byte {error.start} is not UTF-8 text") from None
     except (OSError, ValueError) as error:
-        raise InvalidFile(f"{path}: cannot be read ({_reason(error)})") from None
+        raise InvalidFile(f"{path}: cannot be read ({reason(error)})") from None
     if not text.strip():
         raise InvalidFile(f"{path}: the file is empty")
     return text
@@ -57,7 +57,7 @@ def write_atomically(path: PathLike, content: str | bytes) -> None:
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
     except OSError as error:
-        raise InvalidFile(f"{path}: cannot be written ({_reason(error)})") from None
+        raise InvalidFile(f"{path}: cannot be written ({reason(error)})") from None
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
@@ -79,7 +79,7 @@ def prepare_folder(path: PathLike) -> Path:
     except FileExistsError:
         raise InvalidFile(f"{folder}: is a file; name a folder for the output") from None
     except OSError as error:
-        raise InvalidFile(f"{folder}: cannot be written to ({_reason(error)})") from None
+        raise InvalidFile(f"{folder}: cannot be written to ({reason(error)})") from None
     return folder
 
 
@@ -115,7 +115,8 @@ def _refuse_constant(name: str) -> float:
     raise ValueError(f"the number {name} is not finite")
 
 
-def _reason(error: Exception) -> str:
+def reason(error: Exception) -> str:
+    """What went wrong with a file, as the system says it."""
     return (getattr(error, "strerror", None) or str(error)).lower()
 
 

@@ -38,6 +38,8 @@ KINDS = (
     LimitKind("least_thrust_acceleration", "m/s^2", 2, "least thrust acceleration"),
 )
 """In the order in which kernels number them."""
+LABELS = {kind.name: kind.label for kind in KINDS}
+"""Name of a limit to what it is called in tables and on axes."""
 
 BOUNDING = ("speed", "thrust_acceleration", "jerk", "snap")
 """Limits that bound how fast any course can be flown; a straight climb needs no tilt."""

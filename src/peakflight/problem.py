@@ -233,6 +233,11 @@ class Problem:
         return cls(values.pop("waypoints"), **values)
 
 
+def derivative_name(order: int) -> str:
+    """What a derivative of position is called."""
+    return DERIVATIVE_NAMES[order] if order < len(DERIVATIVE_NAMES) else f"derivative {order}"
+
+
 def as_float_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> np.ndarray:
     """A read-only float copy of `values`, checked against `shape` (None: any length)."""
     try:

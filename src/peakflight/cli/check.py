@@ -9,7 +9,7 @@ from typing import Any
 import click
 import numpy as np
 
-from peakflight.cli.options import LONGEST_QUOTE, common_options, limits_option
+from peakflight.cli.options import common_options, limits_option
 from peakflight.cli.output import (
     Printout,
     amount,
@@ -21,15 +21,14 @@ from peakflight.cli.output import (
     seconds,
 )
 from peakflight.cli.progress import Progress
-from peakflight.errors import InvalidFile, Status
+from peakflight.errors import LONGEST_QUOTE, InvalidFile, Status
 from peakflight.files import read_json
-from peakflight.limits import KINDS, Limits
-from peakflight.problem import DERIVATIVE_NAMES
+from peakflight.limits import LABELS, Limits
+from peakflight.problem import derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 
 CLAIM_TOLERANCE = 1e-6
 """Two numbers agree that are this near, relative; bounds are good to 1e-10."""
-LABELS = {kind.name: kind.label for kind in KINDS}
 
 
 @click.command(short_help="Prove a plan again, from its file alone.")
@@ -166,7 +165,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
         [
             (
                 "joints",
-                f"up to {_derivative(plan.problem.spline_class.continuity)}, largest jump "
+                f"up to {derivative_name(plan.problem.spline_class.continuity)}, largest jump "
                 f"{report.joint_residual:.1e} of its size ({JOINT_TOLERANCE:.0e} allowed)",
             ),
             (
@@ -196,8 +195,3 @@ def _limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
             *ratio_cells(worst),
             ranges(report.binding_segments(kind.name)),
         )
-
-
-def _derivative(order: int) -> str:
-    known = order < len(DERIVATIVE_NAMES)
-    return DERIVATIVE_NAMES[order] if known else f"derivative {order}"

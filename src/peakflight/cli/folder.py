@@ -9,7 +9,7 @@ from typing import Self
 from uuid import uuid4
 
 from peakflight.errors import InvalidFile
-from peakflight.files import PathLike, prepare_folder
+from peakflight.files import PathLike, prepare_folder, reason
 
 LONGEST_NAME = 80
 """Characters of a course's name in that of its folder."""
@@ -45,7 +45,7 @@ class OutputFolder:
             self.stage.mkdir()
         except OSError as error:
             self._tidy_up()
-            raise InvalidFile(f"{self.path}: cannot be written to ({_reason(error)})") from None
+            raise InvalidFile(f"{self.path}: cannot be written to ({reason(error)})") from None
         except BaseException:
             self._tidy_up()
             raise
@@ -76,7 +76,7 @@ class OutputFolder:
             try:
                 staged.replace(target)
             except OSError as error:
-                raise InvalidFile(f"{target}: cannot be written ({_reason(error)})") from None
+                raise InvalidFile(f"{target}: cannot be written ({reason(error)})") from None
 
     def _tidy_up(self) -> None:
         """Remove what is not complete, and folders that were made for nothing."""
@@ -90,7 +90,3 @@ def folder_for(course: str) -> Path:
     """Where the plan of a course goes unless the user says otherwise: in the current folder."""
     name = _ODD.sub("-", course).strip("-.")[:LONGEST_NAME]
     return Path(f"{name or 'course'}-plan")
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

@@ -6,13 +6,11 @@ from typing import Any, TypeVar
 
 import click
 
-from peakflight.errors import InvalidProblem
+from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, LimitKind, Limits
 
 PAPER_LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
 """What the paper's experiments keep, and what counts where no limits are given."""
-LONGEST_QUOTE = 40
-"""Characters of a wrong value that a message shows."""
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -32,10 +30,10 @@ def parse_limits(text: str) -> Limits:
         name, mark, value = (part.strip() for part in item.partition("="))
         if not (name and mark and value):
             raise InvalidProblem(
-                f"{_shown(item.strip())} is not a limit; write name=value, such as speed=5"
+                f"{quoted(item.strip())} is not a limit; write name=value, such as speed=5"
             )
         if name not in kinds:
-            raise InvalidProblem(f"unknown limit {_shown(name)}; known are {', '.join(kinds)}")
+            raise InvalidProblem(f"unknown limit {quoted(name)}; known are {', '.join(kinds)}")
         if name in values:
             raise InvalidProblem(f"limit {name} is given twice")
         values[name] = _number(kinds[name], value)
@@ -107,10 +105,6 @@ def _number(kind: LimitKind, text: str) -> float:
     except ValueError:
         also = ", or degrees such as 50deg" if is_angle else ""
         raise InvalidProblem(
-            f"limit {kind.name} is {_shown(text)}; it must be a number, in {kind.unit}{also}"
+            f"limit {kind.name} is {quoted(text)}; it must be a number, in {kind.unit}{also}"
         ) from None
     return math.radians(number) if in_degrees else number
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]}...")

@@ -7,7 +7,7 @@ import numpy as np
 
 from peakflight.cli.options import written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
-from peakflight.limits import KINDS
+from peakflight.limits import LABELS
 from peakflight.result import Plan
 
 MOST_LEGS = 40
@@ -15,7 +15,6 @@ MOST_LEGS = 40
 ENDS = 10
 """Legs shown at either end where not all are."""
 MOST_NOTES = 10
-LABELS = {kind.name: kind.label for kind in KINDS}
 
 
 def print_plan(

@@ -17,7 +17,7 @@ import re
 from typing import NamedTuple
 
 from peakflight.course import Course
-from peakflight.errors import InvalidFile
+from peakflight.errors import InvalidFile, quoted
 from peakflight.files import PathLike
 
 SEPARATORS = (";", ",", "\t")
@@ -35,8 +35,6 @@ UNITS = {
     "t": {"": 1.0, "s": 1.0, "ms": 1e-3},
 }
 """What one of a unit is in m, rad or s; the empty unit is what counts when none is named."""
-LONGEST_QUOTE = 40
-"""Characters of a wrong value that a message shows."""
 
 _TITLE = re.compile(r"([^\[\]()]*?)\s*(?:[\[(]([^\[\]()]*)[\])])?")
 """The name of a column, and its unit."""
@@ -169,13 +167,13 @@ def _named_columns(titles: list[str], line: int, path: PathLike) -> list[_Column
         if unit not in UNITS[name]:
             known = ", ".join(filter(None, UNITS[name]))
             raise InvalidFile(
-                f"{path}: line {line}: column {name} has the unit {_shown(unit)}; known are {known}"
+                f"{path}: line {line}: column {name} has the unit {quoted(unit)}; known are {known}"
             )
         columns[name] = _Column(name, index, UNITS[name][unit])
     missing = [name for name in "xyz" if name not in columns]
     if missing:
         raise InvalidFile(
-            f"{path}: line {line}: the header {_shown(','.join(titles))} names no column "
+            f"{path}: line {line}: the header {quoted(','.join(titles))} names no column "
             f"{missing[0]}; x, y and z are needed"
         )
     return list(columns.values())
@@ -226,13 +224,9 @@ def _numbers(
     field = fields[wrong.place].strip()
     hint = " with a decimal point" if _is_number(field.replace(",", ".")) else ""
     raise InvalidFile(
-        f"{path}: line {row.line}: {wrong.name} is {_shown(field)}; it must be a number{hint}"
+        f"{path}: line {row.line}: {wrong.name} is {quoted(field)}; it must be a number{hint}"
     )
 
 
 def _columns(count: int) -> str:
     return "1 column" if count == 1 else f"{count} columns"
-
-
-def _shown(text: str) -> str:
-    return repr(text) if len(text) <= LONGEST_QUOTE else f"{text[:LONGEST_QUOTE]!r}..."

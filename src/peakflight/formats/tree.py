@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from peakflight.course import Course
-from peakflight.errors import InvalidFile
+from peakflight.errors import LONGEST_QUOTE, InvalidFile
 from peakflight.files import PathLike
 
 FIRST = ("start", "initial", "start_position", "initial_position", "initState")
@@ -32,8 +32,6 @@ POSITION = ("position", "pos")
 MOTION = ("velocity", "vel", "acceleration", "acc", "jerk", "jer")
 """Derivatives that a point of the known forms can fix."""
 COMPONENTS = ("x", "y", "z", "yaw")
-LONGEST_QUOTE = 40
-"""Characters of a wrong value that a message shows."""
 HUGE = 1024
 """Bits of a whole number that no float can hold, nor a message show."""
 
