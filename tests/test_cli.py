@@ -369,7 +369,7 @@ def test_courses_that_are_no_files(run: Run, folder: Path) -> None:
         ("=5", "'=5' is not a limit"),
         ("speed=5,", "'' is not a limit"),
         ("", "'' is not a limit"),
-        ("speed=" + "9" * 9 + "x" * 900, "xxx...'"),
+        ("speed=" + "9" * 9 + "x" * 900, "xxx'..."),
     ],
 )
 def test_bad_limits(run: Run, folder: Path, text: str, words: str) -> None:
