@@ -23,7 +23,7 @@ import click
 
 import peakflight
 from peakflight.cli.check import check
-from peakflight.cli.main import BAD_INPUT, INTERRUPTED
+from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
 from peakflight.cli.output import print_json
 from peakflight.cli.plan import plan
 from peakflight.errors import PeakflightError

@@ -9,15 +9,14 @@ from _thread import interrupt_main
 from importlib.util import find_spec
 from typing import NoReturn
 
+from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+
 LIBRARIES = ("click", "rich")
 """What the extra `cli` brings and the command line cannot do without."""
 GARBAGE = 100_000
 """Allocations between collections: most of what a short run makes lives until it ends."""
-BAD_INPUT = 2
 INSISTENCE = 0.02
 """How soon a lost Ctrl-C is repeated, s."""
-INTERRUPTED = 130
-"""Exit code after Ctrl-C: 128 and the number of the signal."""
 
 
 def main() -> NoReturn:
