@@ -17,7 +17,7 @@ LINE_SEARCH = 30
 """Most evaluations in one line search."""
 CURVATURE = 1e-15
 """Pairs with less curvature than this, relative to the last, are not kept."""
-WATCH_EVERY = 8
+WATCH_EVERY = 16
 """Iterations after which it is looked up again which limits matter."""
 REPEATS = 10
 """How often a stage begins again because a limit that did not matter is exceeded."""

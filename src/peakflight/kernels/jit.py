@@ -3,9 +3,11 @@
 import hashlib
 import logging
 import os
+import shutil
 import tempfile
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +37,20 @@ def _cache_folder() -> str:
         except OSError:
             continue
         if os.access(folder / name, os.W_OK):
+            _forget_old(folder, name)
             return str(folder / name)
     return tempfile.mkdtemp(prefix=f"{name}-")
 
 
+def _forget_old(folder: Path, name: str) -> None:
+    """Remove what was compiled from other sources, if it has not been touched for a week."""
+    for other in folder.glob("peakflight-*"):
+        with suppress(OSError):
+            if other.name != name and time.time() - other.stat().st_mtime > WEEK:
+                shutil.rmtree(other)
+
+
+WEEK = 7 * 86400.0
 FOLDER = _cache_folder()
 """Where compiled kernels are kept."""
 
