@@ -15,7 +15,6 @@ from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
 from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
-from peakflight.spline import is_plain
 from peakflight.version import __version__
 
 DEFAULT_METHOD = "peak"
@@ -67,7 +66,7 @@ def plan(
             f"settings is {settings!r}; method {method} takes its own Settings "
             f"(peakflight.methods.{method}.Settings)"
         )
-    plain = is_plain(problem.waypoints, problem.spline_class, problem.fixed)
+    plain = problem.spline_class.is_classical and not problem.derivatives
     variant = getattr(settings, "variant", "only")
     kernels = f"{method}-{variant}-{problem.degree}-{'plain' if plain else 'general'}"
     with jit.announced(kernels, _log):
