@@ -46,7 +46,8 @@ class Algorithm1Settings:
         require("neighbour_rate", self.neighbour_rate, 0.0, 1.0)
         require("band", self.band, 0.0, 1.0)
         require("slack", self.slack, 0.0, 1.0)
-        require("start_duration", self.start_duration or 1.0, 1e-3, 1e6)
+        if self.start_duration is not None:
+            require("start_duration", self.start_duration, 1e-3, 1e6)
         require("iterations", self.iterations, 1, 10**7)
         require("history_size", self.history_size, 1, 10**9)
 
