@@ -269,6 +269,17 @@ def test_one_or_two_limits(method, limits):
     assert set(made.report.peaks) == set(limits)
 
 
+@pytest.mark.parametrize("seed", [5, 39, 58])
+def test_peak_is_no_slower_than_where_it_starts(seed):
+    """Least thrust near hover: slowing down helps little against it, so that descents go astray."""
+    waypoints = random_course(np.random.default_rng(seed), 6)
+    limits = Limits(**JERK["limits"].to_dict(), least_thrust_acceleration=8.0)
+    start = plan(waypoints, method="proportional", limits=limits)
+    made = plan(waypoints, method="peak", limits=limits)
+    assert made.feasible
+    assert made.duration <= start.duration
+
+
 @every_method
 @pytest.mark.parametrize(
     "waypoints",

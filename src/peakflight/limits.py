@@ -59,17 +59,17 @@ class Limits:
     """
 
     speed: float | None = None
-    """Largest |v|, m/s (Eq. kapp_i, s = 1)."""
+    """Largest norm of v, m/s (Eq. kapp_i, s = 1)."""
     thrust_acceleration: float | None = None
-    """Largest |a + g e3|, m/s^2, above g (Eq. kappa2, Remark 1)."""
+    """Largest norm of a + g e3, m/s^2, above g (Eq. kappa2, Remark 1)."""
     jerk: float | None = None
-    """Largest |j|, m/s^3 (Eq. kapp_i, s = 3)."""
+    """Largest norm of j, m/s^3 (Eq. kapp_i, s = 3)."""
     snap: float | None = None
-    """Largest |s|, m/s^4 (Eq. kapp_i, s = 4)."""
+    """Largest norm of s, m/s^4 (Eq. kapp_i, s = 4)."""
     tilt: float | None = None
     """Largest angle of a + g e3 from the vertical, rad, below pi/2."""
     least_thrust_acceleration: float | None = None
-    """Smallest |a + g e3|, m/s^2, below g."""
+    """Smallest norm of a + g e3, m/s^2, below g."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
