@@ -277,7 +277,7 @@ def test_peak_is_no_slower_than_where_it_starts(seed):
     start = plan(waypoints, method="proportional", limits=limits)
     made = plan(waypoints, method="peak", limits=limits)
     assert made.feasible
-    assert made.duration <= start.duration
+    assert made.duration <= start.duration * (1.0 + 1e-8)  # each stretch is closed to 1e-9
 
 
 @every_method

@@ -37,6 +37,8 @@ LADDER: tuple[Stage, ...] = (
 """Starting at the power 6 is what makes the plain start safe; ending at 6144 leaves 1e-4."""
 
 VARIANTS = ("descent", "paper")
+DOUBTFUL = 0.95
+"""A descent that gains less than this over its start is compared with it."""
 STRETCHED = 2e-3
 """A descent whose result must be slowed down by more than this has missed something."""
 
@@ -97,13 +99,22 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         failed = outcome.status is Status.INFEASIBLE
     except OutOfRange:
         failed = True
-    if failed:  # the start may do where the descent ended badly
-        outcome = finish(problem, task, start, status=Status.NO_PROGRESS)
+    if failed or outcome.trajectory.duration > DOUBTFUL * start.sum():
+        other = finish(problem, task, start, status=Status.NO_PROGRESS)
+        far = failed or _faster(other, outcome, by=STRETCHED)
+        if far or _faster(other, outcome, by=0.0):
+            outcome = other if far else replace(other, status=outcome.status)
     return replace(
         outcome,
         iterations=iterations,
         history=History(segment_times=np.vstack((start, history[: min(iterations, len(history))]))),
     )
+
+
+def _faster(one: Outcome, other: Outcome, *, by: float) -> bool:
+    """Whether an outcome is feasible, and faster than another by more than a part of its time."""
+    feasible = one.status is not Status.INFEASIBLE
+    return feasible and one.trajectory.duration < (1.0 - by) * other.trajectory.duration
 
 
 @lru_cache
