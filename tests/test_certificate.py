@@ -215,6 +215,14 @@ class Truth:
             angles.append(math.atan2(math.sqrt(across), float(z / size)))
         return max(angles)
 
+    def kappa(self, values, limit):
+        """Peak over limit of one sample, in floats."""
+        x, y, z = (float(value) for value in values)
+        norm = math.hypot(x, y, z)
+        if self.kind == "tilt":
+            return math.atan2(math.hypot(x, y), z) / limit
+        return limit / norm if self.kind == "least_thrust_acceleration" else norm / limit
+
     @cached_property
     def cancels(self):
         """Whether terms cancel so much that rounding of a bound shows in its ninth digit.
@@ -270,7 +278,10 @@ def check_pieces(shape, count, seed):
             assert not is_below(truth, upper[0, index], limit), where
             if not (kind in QUOTIENTS and truth.cancels):
                 assert not is_far_above(truth, upper[0, index], limit), where
-            close += not truth.cancels
+            if not truth.cancels:
+                close += 1
+                attained = truth.kappa(truth.exact[-1], limit)
+                assert attained == pytest.approx(lower[0, index], rel=CLOSE), where
     return close
 
 
