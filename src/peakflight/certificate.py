@@ -62,15 +62,10 @@ def certify(
     if waypoints is None:
         points, firsts = coefficients[:1, 0], np.zeros(0, dtype=np.int64)
     else:
-        legs = len(times) if pieces is None else len(pieces)
-        counts = np.ones(legs, dtype=np.int64) if pieces is None else np.array(pieces)
-        whole = np.issubdtype(counts.dtype, np.integer) and counts.ndim == 1
-        if not (whole and (counts >= 1).all() and counts.sum() == len(times)):
-            raise InvalidProblem(
-                f"pieces must be whole numbers from 1 that add up to the {len(times)} segments"
-            )
-        points = fresh(as_float_array("waypoints", waypoints, (legs + 1, 3)))
-        firsts = np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
+        firsts = (
+            np.arange(len(times), dtype=np.int64) if pieces is None else _firsts(pieces, len(times))
+        )
+        points = fresh(as_float_array("waypoints", waypoints, (len(firsts) + 1, 3)))
     smooth = 2 if continuity is None else continuity
     if smooth < 0:
         raise InvalidProblem(f"continuity is {smooth}; it must be 0 or more")
@@ -169,6 +164,17 @@ def _bound(coefficients: np.ndarray, times: np.ndarray, limits: Limits) -> np.nd
         TOLERANCE, upper, lower, place,
     )  # fmt: skip
     return upper
+
+
+def _firsts(pieces: Sequence[int], segments: int) -> np.ndarray:
+    """(legs,) first segment of each leg, from the number of pieces in each."""
+    counts = np.array(pieces)
+    whole = np.issubdtype(counts.dtype, np.integer) and counts.ndim == 1
+    if not (whole and (counts >= 1).all() and counts.sum() == segments):
+        raise InvalidProblem(
+            f"pieces must be whole numbers from 1 that add up to the {segments} segments"
+        )
+    return np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
 
 
 def _state_error(

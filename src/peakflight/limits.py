@@ -8,6 +8,7 @@ certificate proves). Everything else, from the report to the command line, goes 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -101,6 +102,10 @@ class Limits:
 
     def as_array(self) -> np.ndarray:
         """Values in the order of `KINDS`, shape (len(KINDS),); NaN where nothing is limited."""
+        return self._values.copy()
+
+    @cached_property
+    def _values(self) -> np.ndarray:
         values = (getattr(self, kind.name) for kind in KINDS)
         return np.array([math.nan if value is None else value for value in values])
 

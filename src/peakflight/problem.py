@@ -195,7 +195,8 @@ class Problem:
     @property
     def leg_lengths(self) -> np.ndarray:
         """(K,) m, straight distance between the waypoints of each leg."""
-        return np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1)
+        legs = self.waypoints[1:] - self.waypoints[:-1]
+        return np.sqrt((legs * legs).sum(axis=1))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and names, from which `from_dict` makes the same problem."""
@@ -246,11 +247,13 @@ def as_float_array(name: str, values: ArrayLike, shape: tuple[int | None, ...]) 
         raise InvalidProblem(
             f"{name} must be numbers in an array, all rows of one length"
         ) from None
-    wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
-    if array.ndim != len(shape) or any(
-        n is not None and n != m for n, m in zip(shape, array.shape, strict=True)
-    ):
-        raise InvalidProblem(f"{name} has shape {array.shape}; it must be {wanted}")
+    if array.shape != shape:
+        fits = len(array.shape) == len(shape)
+        for wanted, found in zip(shape, array.shape, strict=False):
+            fits = fits and (wanted is None or wanted == found)
+        if not fits:
+            rule = ", ".join("n" if n is None else str(n) for n in shape)
+            raise InvalidProblem(f"{name} has shape {array.shape}; it must be ({rule})")
     array.setflags(write=False)
     return array
 

@@ -17,7 +17,7 @@ from peakflight.kernels import basis, classical, general
 from peakflight.kernels.jit import fresh
 from peakflight.kernels.layout import make_cost, make_layout
 from peakflight.problem import SplineClass, StateLike, as_float_array, fixed_state
-from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
+from peakflight.trajectory import Trajectory
 
 REFINEMENTS = 3
 """Solves of a general spline with one factorisation; more change nothing at double precision."""
@@ -153,13 +153,13 @@ class SplineTask:
                 data[:] = np.nan
         with np.errstate(all="ignore"):
             coefficients = coefficients_of(data, starts, times)
-        computable = times.min() >= SHORTEST and times.max() <= LONGEST
-        if not (computable and np.isfinite(coefficients).all()):
+        try:
+            return Trajectory(coefficients, times)
+        except InvalidProblem:
             raise OutOfRange(
                 "the spline cannot be computed in double precision: legs and durations differ too "
                 f"much ({times.min():g} to {times.max():g} s) for degree {self.spline_class.degree}"
-            )
-        return Trajectory(coefficients, times)
+            ) from None
 
 
 def is_plain(
@@ -182,8 +182,8 @@ def coefficients_of(data: np.ndarray, starts: np.ndarray, times: np.ndarray) -> 
     """Coefficients (K, N+1, D) from end data (K, N, D), first positions (K, D) and durations."""
     degree = data.shape[1]
     matrix = basis.to_monomials(degree)[:, :degree]
-    powers = times[:, None] ** -np.arange(degree + 1.0)
-    coefficients = np.matmul(matrix, data) * powers[:, :, None]
+    coefficients = np.matmul(matrix, data)
+    coefficients *= times[:, None, None] ** -np.arange(degree + 1.0)[:, None]
     coefficients[:, 0] = starts
     return coefficients
 

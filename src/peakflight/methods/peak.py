@@ -104,11 +104,8 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         far = failed or _faster(other, outcome, by=STRETCHED)
         if far or _faster(other, outcome, by=0.0):
             outcome = other if far else replace(other, status=outcome.status)
-    return replace(
-        outcome,
-        iterations=iterations,
-        history=History(segment_times=np.vstack((start, history[: min(iterations, len(history))]))),
-    )
+    road = np.concatenate((start[None], history[:iterations]))
+    return replace(outcome, iterations=iterations, history=History(segment_times=road))
 
 
 def _faster(one: Outcome, other: Outcome, *, by: float) -> bool:

@@ -31,7 +31,7 @@ def estimated_stretch(ratios: np.ndarray) -> float:
 
     Derivative s falls with the power s of the stretch; what gravity is part of, less simply.
     """
-    return float(np.nanmax(ratios**_ROOTS))
+    return float(np.fmax.reduce(ratios**_ROOTS, axis=None))
 
 
 def finish(
