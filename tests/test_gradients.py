@@ -52,16 +52,20 @@ def adjoint(task, times, data, slope, gradient):
 
 @kernel
 def call_evaluate(
-    rows, spline, times, limits, gravity, tables, watched, doublings, reference, work, gradient
-):
+    rows, waypoints, simple, layered, times, limits, gravity, tables, watched, doublings, reference,
+    work, gradient,
+):  # fmt: skip
     return barrier.evaluate(
-        rows, spline, times, limits, gravity, tables, watched, doublings, reference, work, gradient
-    )
+        rows, waypoints, simple, layered, times, limits, gravity, tables, watched, doublings,
+        reference, work, gradient,
+    )  # fmt: skip
 
 
 @kernel
-def call_watch(rows, spline, times, limits, gravity, tables, doublings, work, watched):
-    barrier.solve_spline(rows, spline[0], spline[1], spline[2], times, work[0])
+def call_watch(
+    rows, waypoints, simple, layered, times, limits, gravity, tables, doublings, work, watched
+):
+    barrier.solve_spline(rows, waypoints, simple, layered, times, work[0])
     barrier.watch(rows, times, limits, gravity, tables, doublings, work, watched)
 
 
@@ -77,7 +81,7 @@ def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watche
         watched = np.repeat(np.isfinite(limits)[None], count, axis=0)
     gradient = np.full(count, NAN)
     value = call_evaluate(
-        task.rows, (task.waypoints, task.simple, task.layered), np.array(times), limits, GRAVITY,
+        task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
         basis.sample_tables(degree, samples), watched, doublings, reference,
         barrier.workspace(count, degree), gradient,
     )  # fmt: skip
@@ -88,7 +92,7 @@ def watched_by(task, times, limits, *, doublings):
     count, degree = len(times), task.spline_class.degree
     watched = np.zeros((count, len(KINDS)), dtype=np.bool_)
     call_watch(
-        task.rows, (task.waypoints, task.simple, task.layered), np.array(times), limits, GRAVITY,
+        task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
         basis.sample_tables(degree, barrier.BATCH), doublings, barrier.workspace(count, degree),
         watched,
     )  # fmt: skip

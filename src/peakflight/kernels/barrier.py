@@ -16,7 +16,7 @@ many short ones. Each loop writes one array, which lets the compiler do several 
 import numpy as np
 
 from peakflight.kernels import classical, general
-from peakflight.kernels.jit import inner, vector
+from peakflight.kernels.jit import vector, within
 from peakflight.kernels.measures import EXPONENTS, KIND_ORDERS, add_slopes, measure
 
 CAP = 2.0
@@ -49,21 +49,22 @@ def workspace(count: int, degree: int) -> tuple[np.ndarray, ...]:
     )
 
 
-@inner
+@within
 def evaluate(
-    rows, spline, times, limits, gravity, tables, watched, doublings, reference, work, gradient
-):
+    rows, waypoints, simple, layered, times, limits, gravity, tables, watched, doublings, reference,
+    work, gradient,
+):  # fmt: skip
     """F and its gradient (K,) by log t; infinite where the spline or f cannot be computed.
 
-    spline: waypoints, and the two workspaces of `solve_spline`; limits: as `Limits.as_array`;
-    tables (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
+    waypoints, simple and layered: see `solve_spline`; limits: as `Limits.as_array`; tables
+    (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
     p = 24 * 2^doublings.
     """
     data, slope, samples, squares, weights, vertical, values, grown, kinds, orders = work
     power = BASE_POWER * 2.0**doublings
     floor = np.exp(NEGLIGIBLE / power)  # of m^(1/e)
     cap = np.exp(CAP / power)
-    if not solve_spline(rows, spline[0], spline[1], spline[2], times, data):
+    if not solve_spline(rows, waypoints, simple, layered, times, data):
         return np.inf
     total = 0.0
     barrier = 0.0
@@ -110,12 +111,12 @@ def evaluate(
             gradient[k] -= _push(
                 rows, data, k, times[k], tables, by_piece, k - begin, lowest, highest, slope
             )
-    spline_adjoint(rows, spline[0], spline[1], spline[2], times, data, slope, gradient)
+    spline_adjoint(rows, waypoints, simple, layered, times, data, slope, gradient)
     value = total / reference + barrier / power
     return value if value < np.inf else np.inf
 
 
-@inner
+@within
 def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     """Look up which limits come near enough to matter on which pieces: watched (K, kinds).
 
@@ -144,12 +145,13 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     return missed
 
 
-@inner
+@within
 def solve_spline(rows, waypoints, simple, layered, times, data):
     """End data (K, N, D) of the spline for given times; False where there is none.
 
     simple is a workspace of `kernels.classical`, layered one of `kernels.general`. One of them is
-    None: that is known when the kernel is compiled, and its branch is left out.
+    None: that is known when the kernel is compiled, and its branch is left out. (They must be
+    arguments of the function that is compiled, not parts of a tuple, for Numba to see that.)
     """
     solved = True
     if simple is None:
@@ -169,7 +171,7 @@ def solve_spline(rows, waypoints, simple, layered, times, data):
     return solved
 
 
-@inner
+@within
 def spline_adjoint(rows, waypoints, simple, layered, times, data, slope, gradient):
     """Add to gradient (K,) how what has derivative `slope` by the end data changes by log times."""
     if simple is None:

@@ -17,7 +17,7 @@ from math import comb, perm
 
 import numpy as np
 
-from peakflight.kernels.jit import inner, kernel
+from peakflight.kernels.jit import inner, kernel, within
 
 KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
 """The derivative that each kind is about."""
@@ -203,7 +203,7 @@ def _required_stretch(kind, x, y, z, limit, gravity):
     return (np.sqrt(square) / limit) ** (1.0 / KIND_ORDERS[kind])
 
 
-@inner
+@within
 def _quotient(
     kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
 ):

@@ -26,13 +26,17 @@ PATIENCE = 5
 
 
 @kernel
-def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory, work, history):
+def descend(
+    rows, waypoints, simple, layered, times, limits, gravity, tables, dense, stages, memory, work,
+    history,
+):  # fmt: skip
     """Minimise the barrier functions of a ladder of stages, each from the last one's result.
 
-    times (K,) is replaced; tables: one of `basis.sample_tables` a stage, dense: one more, of the
-    most samples; work: `barrier.workspace`; stages (n, 3): doublings
-    of the power, most iterations, relative decrease at which the stage ends; memory: pairs that
-    L-BFGS keeps; history (rows, K) gets the times of the first iterations.
+    waypoints, simple and layered: see `barrier.solve_spline`; times (K,) is replaced; tables: one
+    of `basis.sample_tables` a stage, dense: one more, of the most samples; work:
+    `barrier.workspace`; stages (n, 3): doublings of the power, most iterations, relative decrease
+    at which the stage ends; memory: pairs that L-BFGS keeps; history (rows, K) gets the times of
+    the first iterations.
 
     Returns iterations and whether every stage met its own stopping rule.
     """
@@ -94,8 +98,8 @@ def descend(rows, spline, times, limits, gravity, tables, dense, stages, memory,
             for k in range(count):
                 times[k] = np.exp(trial[k])
             trial_value = evaluate(
-                rows, spline, times, limits, gravity, tables[stage], watched, doublings, reference,
-                work, trial_gradient,
+                rows, waypoints, simple, layered, times, limits, gravity, tables[stage], watched,
+                doublings, reference, work, trial_gradient,
             )  # fmt: skip
             if iteration >= 0:  # line search: halve or double until the weak Wolfe conditions hold
                 searched += 1

@@ -73,6 +73,9 @@ kernel = _compiled(nogil=True)
 """Decorator of every kernel that Python calls; other threads run meanwhile."""
 inner = _compiled(**_INNER)
 """Decorator of kernels that only kernels call: no entry point from Python, less to compile."""
+within = _compiled(**_INNER, inline="always")
+"""As `inner`, for what has one caller and is large: it is written into the caller. Compiled by
+itself first, it and all that it calls would go through the optimiser once more at every level."""
 vector = _compiled(**_INNER, fastmath={"reassoc", "contract", "nsz"})
 """As `inner`, for loops over samples: sums may be taken in any order. NaN and infinity stay."""
 

@@ -84,7 +84,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     count, degree = len(times), task.spline_class.degree
     history = np.empty((max(settings.history_size // count, 1), count))
     iterations, converged = descent.descend(
-        task.rows, (task.waypoints, task.simple, task.layered), times,
+        task.rows, task.waypoints, task.simple, task.layered, times,
         problem.limits.as_array(), GRAVITY,
         tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
         basis.sample_tables(degree, barrier.BATCH),
