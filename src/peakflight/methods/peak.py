@@ -32,7 +32,7 @@ LADDER: tuple[Stage, ...] = (
     (8, 96, 1e-3),
     (16, 384, 1e-4),
     (32, 1536, 5e-5),
-    (64, 6144, 7e-6),
+    (64, 6144, 8e-6),
 )
 """Starting at the power 6 is what makes the plain start safe; ending at 6144 leaves 1e-4."""
 
@@ -54,7 +54,7 @@ class Settings:
     the relative decrease over five iterations that ends the stage."""
     stage_iterations: int = 300
     """Most iterations in a stage."""
-    memory: int = 10
+    memory: int = 50
     """Pairs that L-BFGS keeps."""
     history_size: int = 1_000_000
     """Most segment times kept for the history, of all iterations together."""
