@@ -775,5 +775,5 @@ def test_limits_of_a_problem_are_certified_with_its_own_continuity():
     points = [[0, 0, 1], [1, 0, 1], [2, 1, 1]]
     problem = Problem(points, limits=GENTLE, minimize="snap", degree=5)
     spline = minimum_effort_spline(points, [1.0, 1.0], minimize="snap", degree=5)
-    assert certify(spline, GENTLE, continuity=problem.continuity).feasible
-    assert not certify(spline, GENTLE, continuity=problem.continuity + 1).feasible
+    assert certify(spline, GENTLE, continuity=problem.spline_class.continuity).feasible
+    assert not certify(spline, GENTLE, continuity=problem.spline_class.continuity + 1).feasible

@@ -84,7 +84,7 @@ def check(made, *, start=None, end=None, samples=300):
     size = 1.0 + np.abs(problem.waypoints).max()
     np.testing.assert_allclose(at_start, problem.waypoints[:-1], rtol=0, atol=1e-9 * size)
     np.testing.assert_allclose(at_end, problem.waypoints[1:], rtol=0, atol=1e-9 * size)
-    for order in range(1, problem.continuity + 1):
+    for order in range(1, problem.spline_class.continuity + 1):
         pieces = trajectory.sample(2, order)
         jumps = np.abs(pieces[1:, 0] - pieces[:-1, 1])
         shortest = trajectory.segment_times.min()

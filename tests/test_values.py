@@ -279,7 +279,7 @@ def test_a_problem_is_frozen_and_shares_nothing():
     np.testing.assert_array_equal(problem.waypoints, POINTS)
     np.testing.assert_array_equal(problem.derivatives[1], [[1.0, 1.0, 1.0]])
     assert problem.spline_class.weights == (0, 0, 0, 1.0, 0, 0)
-    assert problem.degree == 5
+    assert problem.spline_class.degree == 5
     assert_frozen(problem)
     for array in (problem.waypoints, problem.start, problem.end, problem.yaw,
                   problem.derivatives[1]):  # fmt: skip
@@ -306,13 +306,13 @@ def test_states_are_filled_in():
 
 
 def test_natural_degree_and_continuity():
-    assert (Problem(POINTS, limits=LIMITS).degree, Problem(POINTS, limits=LIMITS).continuity) == (
-        5, 4,
-    )  # fmt: skip
+    plain = Problem(POINTS, limits=LIMITS)
+    assert (plain.degree, plain.continuity) == (None, None)
+    assert (plain.spline_class.degree, plain.spline_class.continuity) == (5, 4)
     paper = Problem(POINTS, limits=LIMITS, minimize="snap", degree=5)
-    assert paper.continuity == 3
+    assert paper.spline_class.continuity == 3
     inner = Problem(POINTS, limits=LIMITS, derivatives={1: {"velocity": [1, 0, 0]}})
-    assert inner.continuity == 2
+    assert inner.spline_class.continuity == 2
 
 
 @pytest.mark.parametrize(

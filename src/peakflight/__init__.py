@@ -22,7 +22,7 @@ from peakflight.version import __version__
 
 if TYPE_CHECKING:
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
-    from peakflight.planner import plan
+    from peakflight.planner import plan, replan
     from peakflight.spline import minimum_effort_spline
 
 __all__ = [
@@ -46,6 +46,7 @@ __all__ = [
     "minimum_effort_spline",
     "plan",
     "read_course",
+    "replan",
     "stretch_to_limits",
     "tidy",
 ]
@@ -55,6 +56,7 @@ _LAZY = {
     "certify_plan": "peakflight.certificate",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
+    "replan": "peakflight.planner",
     "stretch_to_limits": "peakflight.certificate",
 }
 

@@ -2,6 +2,7 @@
 
 import logging
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
 from peakflight.version import __version__
 
-DEFAULT_METHOD = "peak"
+DEFAULT_METHOD = "joint"
+"""What `plan` does if it is not told."""
 
 _log = logging.getLogger("peakflight")
 
@@ -41,6 +43,9 @@ def plan(
         One of `peakflight.methods.METHODS`.
     settings
         The `Settings` of the method's module; None for its defaults.
+    options
+        Options of `Problem` beside waypoints, and any field of the settings, such as `pieces`,
+        `time_limit` or `effort` of method joint.
 
     Returns
     -------
@@ -53,26 +58,29 @@ def plan(
     """
     began = time.perf_counter()
     module = methods.find(method)
+    tuning = {name: options.pop(name) for name in _fields(module.Settings) & set(options)}
     notes: tuple[str, ...] = ()
     if not isinstance(problem, Problem):
         problem, notes = _tidied(problem, limits, options)
     elif limits is not None or options:
         given = ", ".join(["limits"] * (limits is not None) + list(options))
-        raise InvalidProblem(f"{given} given beside a Problem, which has its own")
+        if _fields(Problem).issuperset(options):
+            raise InvalidProblem(f"{given} given beside a Problem, which has its own")
+        raise InvalidProblem(f"unknown option {min(set(options) - _fields(Problem))!r}")
     if settings is None:
-        settings = module.Settings()
+        settings = module.Settings(**tuning)
     elif not isinstance(settings, module.Settings):
         raise InvalidProblem(
             f"settings is {settings!r}; method {method} takes its own Settings "
             f"(peakflight.methods.{method}.Settings)"
         )
-    plain = problem.spline_class.is_classical and not problem.derivatives
-    variant = getattr(settings, "variant", "only")
-    kernels = f"{method}-{variant}-{problem.degree}-{'plain' if plain else 'general'}"
-    with jit.announced(kernels, _log):
+    elif tuning:
+        settings = replace(settings, **tuning)  # type: ignore[type-var]
+    with jit.announced(module.kernels(problem, settings), _log):
         impossible = _contradiction(problem)
         outcome = module.solve(problem, settings)
-        report = certify_answer(problem, outcome.trajectory)
+        problem = outcome.problem or problem
+        report = certify_answer(problem, outcome.trajectory, outcome.pieces)
     status = outcome.status
     if not report.feasible and status is not Status.INFEASIBLE:
         status = Status.NUMERICAL
@@ -83,13 +91,54 @@ def plan(
         status=status,
         trajectory=outcome.trajectory,
         report=report,
-        pieces=(1,) * (len(problem.waypoints) - 1),
+        pieces=outcome.pieces or (1,) * (len(problem.waypoints) - 1),
         iterations=outcome.iterations,
         wall_time_s=time.perf_counter() - began,
         message="; ".join(line for line in lines if line),
         history=outcome.history,
         version=__version__,
+        memory=outcome.memory,
     )
+
+
+def replan(
+    last: Plan,
+    *,
+    waypoints: ArrayLike | None = None,
+    limits: Limits | None = None,
+    **options: Any,
+) -> Plan:
+    """Plan again after something has changed, from the last plan.
+
+    Method joint then begins from the last trajectory and keeps its pieces, which takes a fraction
+    of the time; every other method, and a course with more or fewer waypoints, begins anew.
+
+    Parameters
+    ----------
+    last
+        The last plan.
+    waypoints, limits
+        What has changed.
+    options
+        Further options of `Problem`, or fields of the settings of the plan's method.
+
+    Raises
+    ------
+    InvalidProblem
+        As `plan`.
+    """
+    changes = {name: options.pop(name) for name in _fields(Problem) & set(options)}
+    if waypoints is not None:
+        changes["waypoints"] = waypoints
+    if limits is not None:
+        changes["limits"] = limits
+    if "initial" in _fields(methods.find(last.method).Settings):
+        options.setdefault("initial", last)
+    return plan(replace(last.problem, **changes), method=last.method, **options)
+
+
+def _fields(kind: Any) -> set[str]:
+    return set(kind.__dataclass_fields__)
 
 
 def _tidied(
@@ -104,7 +153,7 @@ def _tidied(
         raise InvalidProblem(
             f"{notes[0]}, but derivatives name waypoints by number; merge first (peakflight.tidy)"
         )
-    unknown = set(options) - set(Problem.__dataclass_fields__)
+    unknown = set(options) - _fields(Problem)
     if unknown:
         raise InvalidProblem(f"unknown option {min(unknown)!r}")
     return Problem(course.waypoints, limits=limits, yaw=course.yaw, **options), notes

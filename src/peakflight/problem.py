@@ -123,9 +123,9 @@ class Problem:
     )
     """The cost of sub-problem 1; see `SplineClass.of`."""
     degree: int | None = field(default=None, kw_only=True)
-    """Degree of the polynomials; None picks the natural one for the cost."""
+    """Degree of the polynomials; None leaves it to the method (`spline_class` for splines)."""
     continuity: int | None = field(default=None, kw_only=True)
-    """Highest continuous derivative; None picks the natural one."""
+    """Highest continuous derivative; None leaves it to the method."""
     start: StateLike | None = field(default=None, kw_only=True)
     """Derivatives at the first waypoint; None is rest. Orders left out are zero, NaN is free."""
     end: StateLike | None = field(default=None, kw_only=True)
@@ -150,11 +150,7 @@ class Problem:
             object.__setattr__(self, "minimize", dict(self.minimize))
         elif not isinstance(self.minimize, str):
             object.__setattr__(self, "minimize", tuple(self.minimize))
-        spline_class = SplineClass.of(
-            self.minimize, self.degree, self.continuity, inner=bool(self.derivatives)
-        )
-        object.__setattr__(self, "degree", spline_class.degree)
-        object.__setattr__(self, "continuity", spline_class.continuity)
+        spline_class = self.spline_class
         if self.yaw is not None:
             object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
         rest = spline_class.end_orders
@@ -174,8 +170,10 @@ class Problem:
 
     @cached_property
     def spline_class(self) -> SplineClass:
-        """Degree, weights and continuity, filled in."""
-        return SplineClass.of(self.minimize, self.degree, self.continuity)
+        """Degree, weights and continuity of the spline of least effort, filled in."""
+        return SplineClass.of(
+            self.minimize, self.degree, self.continuity, inner=bool(self.derivatives)
+        )
 
     @property
     def fixed(self) -> dict[int, np.ndarray]:

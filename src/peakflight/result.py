@@ -124,6 +124,8 @@ class Plan:
     history: History | None = field(default=None, repr=False)
     version: str = ""
     """Version of peakflight that made it."""
+    memory: Any = field(default=None, repr=False)
+    """What its method keeps to plan a similar problem faster; not written to files."""
 
     @property
     def feasible(self) -> bool:

@@ -195,6 +195,28 @@ class Trajectory:
         times[0] -= local
         return left, type(self)(coefficients, times, float(t))
 
+    def subdivide(self, parts: ArrayLike) -> Self:
+        """The same motion, piece k cut into `parts[k]` pieces of equal duration.
+
+        Parameters
+        ----------
+        parts
+            Whole numbers from 1: (K,), or one for all.
+        """
+        counts = np.broadcast_to(np.asarray(parts), len(self))
+        if not (np.issubdtype(counts.dtype, np.integer) and (counts >= 1).all()):
+            raise ValueError("parts must be whole numbers from 1")
+        parent = np.repeat(np.arange(len(self)), counts)
+        first = np.cumsum(counts) - counts
+        times = (self.segment_times / counts)[parent]
+        offset = (np.arange(len(parent)) - first[parent]) * times
+        coefficients = np.zeros((len(parent), *self.coefficients.shape[1:]))
+        for j in range(self.degree + 1):  # Taylor shift
+            for i in range(j, self.degree + 1):
+                shift = comb(i, j) * offset ** (i - j)
+                coefficients[:, j] += shift[:, None] * self.coefficients[parent, i]
+        return type(self)(coefficients, times, self.start_time)
+
     def join(self, other: Self) -> Self:
         """Append `other`, moved in time to follow at once.
 

@@ -38,6 +38,18 @@ def to_monomials(degree: int) -> np.ndarray:
 
 
 @lru_cache
+def from_monomials(degree: int, given: int) -> np.ndarray:
+    """(N, M+1): end data of degree N from coefficients of 1, u, u^2, ... up to degree M `given`."""
+    left, _ = counts(degree)
+    rows = []
+    for row, order in enumerate(row_orders(degree)[:degree]):
+        at_start = 0 < row < left
+        rows.append([_falling(i, order) * (i == order or not at_start) for i in range(given + 1)])
+    rows[0][0] = 0  # the step from start to end
+    return np.array(rows, dtype=float)
+
+
+@lru_cache
 def end_rows(degree: int) -> np.ndarray:
     """(2, N+1, N): derivative o by u at u = 0 and u = 1 from the end data, o = 0..N.
 
@@ -68,9 +80,13 @@ def energy(degree: int, order: int) -> np.ndarray:
 @lru_cache
 def sample_tables(degree: int, count: int) -> np.ndarray:
     """(N, 4, count): derivatives 1..4 by u of each basis function at even points, ends included."""
-    u = np.linspace(0.0, 1.0, count)
+    return derivative_tables(degree, np.linspace(0.0, 1.0, count))
+
+
+def derivative_tables(degree: int, u: np.ndarray) -> np.ndarray:
+    """(N, 4, S): derivatives 1..4 by u of each basis function at S points of the unit interval."""
     monomials = to_monomials(degree)[:, :degree]
-    tables = np.zeros((degree, ORDERS, count))
+    tables = np.zeros((degree, ORDERS, len(u)))
     for order in range(1, ORDERS + 1):
         for power in range(order, degree + 1):
             values = perm(power, order) * u ** (power - order)

@@ -17,6 +17,7 @@ from peakflight.trajectory import Trajectory
 METHODS = {
     "proportional": "times proportional to distance, stretched until feasible",
     "peak": "best segment times for the spline, or the paper's Algorithm 1 (variant paper)",
+    "joint": "durations and coefficients together: the fastest",
 }
 """Name, which is also that of the module, and what it does in a line."""
 
@@ -28,8 +29,14 @@ class Outcome:
     status: Status
     trajectory: Trajectory
     """Feasible, unless the status is INFEASIBLE: then the best there was."""
+    problem: Problem | None = None
+    """The problem with what it left to the method filled in; None if it left nothing."""
+    pieces: tuple[int, ...] | None = None
+    """(legs,) segments in each leg; None for one each."""
     iterations: int = 0
     history: History | None = None
+    memory: Any = None
+    """What the method wants back when it plans a similar problem; see `Plan.memory`."""
     message: str = ""
     """Why there is no solution, or what stopped the method early."""
 
@@ -39,6 +46,9 @@ class Method(Protocol):
 
     Settings: type
     """Frozen, every field with a default."""
+
+    def kernels(self, problem: Problem, settings: Any) -> str:
+        """Which set of kernels answers a problem: another one has to be compiled first."""
 
     def solve(self, problem: Problem, settings: Any) -> Outcome:
         """Answer a problem."""
@@ -54,6 +64,12 @@ def require(name: str, value: float, low: float, high: float) -> None:
     """
     if not low <= value <= high:
         raise InvalidProblem(f"setting {name} is {value!r}; it must be from {low:g} to {high:g}")
+
+
+def spline_kernels(problem: Problem) -> str:
+    """Which kernels solve the spline of a problem."""
+    plain = problem.spline_class.is_classical and not problem.derivatives
+    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}"
 
 
 def find(name: str) -> Method:

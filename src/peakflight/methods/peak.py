@@ -17,7 +17,7 @@ from peakflight.certificate import peak_ratios
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import barrier, basis, descent
 from peakflight.limits import GRAVITY
-from peakflight.methods import Outcome, algorithm1, require
+from peakflight.methods import Outcome, algorithm1, require, spline_kernels
 from peakflight.methods.algorithm1 import Algorithm1Settings
 from peakflight.methods.scaling import estimated_stretch, finish, proportional_times
 from peakflight.problem import Problem
@@ -71,6 +71,11 @@ class Settings:
         require("memory", self.memory, 1, 1000)
         require("history_size", self.history_size, 1, 10**9)
         _stages(self.ladder, self.stage_iterations)
+
+
+def kernels(problem: Problem, settings: Settings) -> str:
+    """Those of the variant, for the spline."""
+    return f"peak-{settings.variant}-{spline_kernels(problem)}"
 
 
 def solve(problem: Problem, settings: Settings) -> Outcome:

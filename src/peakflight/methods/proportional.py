@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from peakflight.methods import Outcome
+from peakflight.methods import Outcome, spline_kernels
 from peakflight.methods.scaling import finish, proportional_times
 from peakflight.problem import Problem
 from peakflight.result import History
@@ -12,6 +12,12 @@ from peakflight.spline import SplineTask
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """There is nothing to set."""
+
+
+def kernels(problem: Problem, settings: Settings) -> str:
+    """Those of the spline."""
+    del settings
+    return f"proportional-{spline_kernels(problem)}"
 
 
 def solve(problem: Problem, settings: Settings) -> Outcome:

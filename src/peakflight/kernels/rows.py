@@ -1,0 +1,315 @@
+"""What `joint` sees of each kind of limit: one small unit a kind.
+
+A unit maps the samples of a piece (velocity, F = a + g e3, jerk, snap) to values c that are at most
+0 exactly when a sample keeps its limit, with their slopes by the derivatives that the kind depends
+on (`KIND_TERMS`), a bend for each of those: a multiple of the identity that stands for the positive
+part of the second derivative; and the largest stretch that a sample would need. Beside it stands
+its kappa, peak over limit, from which the solver learns what happens between samples.
+
+A new kind is one pair of functions, a line in `constrain` and in `kappa`, and a line in
+`KIND_TERMS`. Kinds are numbered as in `limits.KINDS`. Limits are given sample by sample: the solver
+lowers them where the limit would be exceeded nearby.
+"""
+
+import numpy as np
+
+from peakflight.kernels.jit import inner, vector
+
+KIND_TERMS: tuple[tuple[int, ...], ...] = ((1,), (2,), (3,), (4,), (2,), (2,), (2, 3), (2, 3, 4))
+"""The derivatives that each kind depends on."""
+ROOTS = np.array([0, 0, 1, 2])
+"""Square roots taken of |d|^2 / L^2 for speed, thrust, jerk and snap: they tame high orders."""
+TINY = 1e-150
+"""Added to what is divided by."""
+BENT = 0.25
+"""Squared ratio below which roots are continued by their tangent: far from a limit, quadratic."""
+ROUNDNESS = 1e-2
+"""Least horizontal acceleration, as a part of gravity, that tilt knows: no kink when upright."""
+WEIGHTLESS = 1e-8
+"""Least |F|^2, as a part of g^2, that rates of the thrust direction are divided by."""
+
+
+@inner
+def constrain(kind, turning, samples, count, limits, gravity, values, first, slopes, bends):
+    """Values, slopes and bends of a kind at the samples of a piece; returns the stretch they need.
+
+    samples (3, 4, S): axes, derivatives, samples; limits, values (S,); slopes (P, 3, S) and
+    bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; turning:
+    None if no kind has more than one term.
+    """
+    slope = slopes[first]
+    bend = bends[first]
+    if kind == 1:
+        return _thrust(samples, count, limits, gravity, values, slope, bend)
+    if kind < 4:
+        return _norm(samples, kind, count, limits, ROOTS[kind], values, slope, bend)
+    if kind == 4:
+        return _tilt(samples, count, limits, gravity, values, slope, bend)
+    if kind == 5:
+        return _least_thrust(samples, count, limits, gravity, values, slope, bend)
+    return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
+
+
+@inner
+def _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends):
+    """Kinds about how the thrust direction turns; not compiled where none is set."""
+    if turning is None:
+        return 0.0
+    if kind == 6:
+        return _body_rate(samples, count, limits, gravity, values, first, slopes, bends)
+    return _angular_acceleration(samples, count, limits, gravity, values, first, slopes, bends)
+
+
+@inner
+def kappa(kind, turning, samples, count, limit, gravity, out):
+    """Out (S,) <- peak over limit of each sample (Eq. kapp_i, Eq. kappa2)."""
+    if kind < 4:
+        _norm_kappa(samples, kind, count, limit, out)
+    elif kind == 4:
+        _tilt_kappa(samples, count, limit, out)
+    elif kind == 5:
+        _least_thrust_kappa(samples, count, limit, out)
+    else:
+        _turn_kappa(turning, kind, samples, count, limit, gravity, out)
+
+
+@inner
+def _turn_kappa(turning, kind, samples, count, limit, gravity, out):
+    if turning is None:
+        return
+    if kind == 6:
+        _body_rate_kappa(samples, count, limit, gravity, out)
+    else:
+        _angular_acceleration_kappa(samples, count, limit, gravity, out)
+
+
+@vector
+def _norm(samples, row, count, limits, roots, values, slope, bend):
+    """|d|^2 / L^2, or its square or fourth root, less 1; the bend leaves out what is negative."""
+    worst = 0.0
+    for q in range(count):
+        x = samples[0, row, q]
+        y = samples[1, row, q]
+        z = samples[2, row, q]
+        values[q] = (x * x + y * y + z * z) / (limits[q] * limits[q])
+    for q in range(count):
+        worst = max(worst, values[q])
+    for q in range(count):
+        bend[q] = 2.0 / (limits[q] * limits[q])
+    if roots > 0:
+        for q in range(count):
+            ratio = max(values[q], BENT)
+            raised = np.sqrt(ratio)
+            if roots > 1:
+                raised = np.sqrt(raised)
+            steep = raised / (ratio * 2**roots)
+            bend[q] *= steep
+            values[q] = raised + steep * (values[q] - ratio)
+    for q in range(count):
+        values[q] -= 1.0
+    for x in range(3):
+        for q in range(count):
+            slope[x, q] = bend[q] * samples[x, row, q]
+    return worst ** (0.5 / (row + 1))
+
+
+@vector
+def _norm_kappa(samples, row, count, limit, out):
+    for q in range(count):
+        x = samples[0, row, q]
+        y = samples[1, row, q]
+        z = samples[2, row, q]
+        out[q] = np.sqrt(x * x + y * y + z * z) / limit
+
+
+@vector
+def _thrust(samples, count, limits, gravity, values, slope, bend):
+    """|F|^2 / L^2 - 1; its squared stretch r solves |a|^2 + 2 g a_z r + (g^2 - L^2) r^2 = 0."""
+    worst = 0.0
+    for q in range(count):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        z = samples[2, 1, q]
+        square = limits[q] * limits[q]
+        values[q] = (x * x + y * y + z * z) / square - 1.0
+        bend[q] = 2.0 / square
+        b = gravity * (z - gravity)
+        room = square - gravity * gravity
+        own = x * x + y * y + (z - gravity) * (z - gravity)
+        slope[0, q] = (b + np.sqrt(b * b + max(room, 1e-3) * own)) / max(room, 1e-3)
+    for q in range(count):
+        worst = max(worst, slope[0, q])
+    for x in range(3):
+        for q in range(count):
+            slope[x, q] = bend[q] * samples[x, 1, q]
+    return np.sqrt(worst)
+
+
+@vector
+def _tilt(samples, count, limits, gravity, values, slope, bend):
+    """(|F_xy| cot L - F_z) / g; linear in the stretch squared."""
+    worst = 0.0
+    for q in range(count):
+        cotangent = 1.0 / np.tan(limits[q])
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        across = np.sqrt(x * x + y * y + (ROUNDNESS * gravity) ** 2)
+        values[q] = (across * cotangent - samples[2, 1, q]) / gravity
+        bend[q] = cotangent / (gravity * across)
+        slope[0, q] = bend[q] * x
+        slope[1, q] = bend[q] * y
+        slope[2, q] = -1.0 / gravity
+    for q in range(count):
+        worst = max(worst, values[q] + 1.0)
+    return np.sqrt(worst)
+
+
+@vector
+def _tilt_kappa(samples, count, limit, out):
+    for q in range(count):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        out[q] = np.arctan2(np.sqrt(x * x + y * y), samples[2, 1, q]) / limit
+
+
+@vector
+def _least_thrust(samples, count, limits, gravity, values, slope, bend):
+    """(L - |F|) / g; the stretch is the larger root of |a|^2 + 2 g a_z r + (g^2 - L^2) r^2."""
+    worst = 0.0
+    for q in range(count):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        z = samples[2, 1, q]
+        norm = np.sqrt(x * x + y * y + z * z + TINY)
+        values[q] = (limits[q] - norm) / gravity
+        bend[q] = 0.0
+        for axis in range(3):
+            slope[axis, q] = -samples[axis, 1, q] / (gravity * norm)
+        b = gravity * (gravity - z)
+        room = gravity * gravity - limits[q] * limits[q]
+        own = x * x + y * y + (z - gravity) * (z - gravity)
+        under = b * b - room * own
+        needed = (b + np.sqrt(under)) / room if b > 0.0 and under > 0.0 else 0.0
+        worst = max(worst, needed)
+    return np.sqrt(worst)
+
+
+@vector
+def _least_thrust_kappa(samples, count, limit, out):
+    for q in range(count):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        z = samples[2, 1, q]
+        out[q] = limit / np.sqrt(x * x + y * y + z * z + TINY)
+
+
+@vector
+def _body_rate(samples, count, limits, gravity, values, first, slopes, bends):
+    """|j across F| / (|F| L) - 1: how fast the thrust direction turns, against its limit."""
+    by_thrust = slopes[first]
+    by_jerk = slopes[first + 1]
+    worst = 0.0
+    for q in range(count):
+        square = WEIGHTLESS * gravity * gravity
+        along = 0.0
+        for x in range(3):
+            square += samples[x, 1, q] * samples[x, 1, q]
+            along += samples[x, 1, q] * samples[x, 2, q]
+        turn = along / square  # F.j / F.F
+        size = 0.0
+        for x in range(3):
+            across = samples[x, 2, q] - turn * samples[x, 1, q]
+            size += across * across
+        ratio = size / (square * limits[q] * limits[q])
+        worst = max(worst, ratio)
+        steep = 0.5 / np.sqrt(max(ratio, BENT))
+        values[q] = 2.0 * steep * max(ratio, BENT) + steep * (ratio - max(ratio, BENT)) - 1.0
+        unit = 2.0 * steep / (square * limits[q] * limits[q])
+        for x in range(3):
+            across = samples[x, 2, q] - turn * samples[x, 1, q]
+            by_thrust[x, q] = -unit * (turn * across + size / square * samples[x, 1, q])
+            by_jerk[x, q] = unit * across
+        bends[first, q] = 2.0 * steep * ratio / square
+        bends[first + 1, q] = unit
+    return worst ** (1.0 / 6.0)
+
+
+@vector
+def _body_rate_kappa(samples, count, limit, gravity, out):
+    for q in range(count):
+        square = WEIGHTLESS * gravity * gravity
+        along = 0.0
+        jerk = 0.0
+        for x in range(3):
+            square += samples[x, 1, q] * samples[x, 1, q]
+            along += samples[x, 1, q] * samples[x, 2, q]
+            jerk += samples[x, 2, q] * samples[x, 2, q]
+        out[q] = np.sqrt(max(jerk - along * along / square, 0.0) / square) / limit
+
+
+@vector
+def _angular_acceleration(samples, count, limits, gravity, values, first, slopes, bends):
+    """|s - 2 r j across F| / (|F| L) - 1 with r = F.j / F.F: how fast that turning changes."""
+    by_thrust = slopes[first]
+    by_jerk = slopes[first + 1]
+    by_snap = slopes[first + 2]
+    worst = 0.0
+    for q in range(count):
+        square = WEIGHTLESS * gravity * gravity
+        along = 0.0
+        snap = 0.0
+        for x in range(3):
+            square += samples[x, 1, q] * samples[x, 1, q]
+            along += samples[x, 1, q] * samples[x, 2, q]
+            snap += samples[x, 1, q] * samples[x, 3, q]
+        turn = along / square  # F.j / F.F
+        pull = snap / square  # F.s / F.F
+        size = 0.0
+        product = 0.0
+        rate = 0.0
+        for x in range(3):
+            across = samples[x, 2, q] - turn * samples[x, 1, q]
+            swing = samples[x, 3, q] - pull * samples[x, 1, q] - 2.0 * turn * across
+            size += swing * swing
+            product += swing * across
+            rate += across * across
+        ratio = size / (square * limits[q] * limits[q])
+        worst = max(worst, ratio)
+        steep = 0.5 / np.sqrt(max(ratio, BENT))
+        values[q] = 2.0 * steep * max(ratio, BENT) + steep * (ratio - max(ratio, BENT)) - 1.0
+        unit = 2.0 * steep / (square * limits[q] * limits[q])
+        for x in range(3):
+            thrust = samples[x, 1, q]
+            across = samples[x, 2, q] - turn * thrust
+            swing = samples[x, 3, q] - pull * thrust - 2.0 * turn * across
+            by_thrust[x, q] = unit * (
+                (2.0 * turn * turn - pull) * swing
+                - 2.0 * product / square * (across - turn * thrust)
+                - size / square * thrust
+            )
+            by_jerk[x, q] = -2.0 * unit * (turn * swing + product / square * thrust)
+            by_snap[x, q] = unit * swing
+        bends[first, q] = 2.0 * steep * ratio / square
+        bends[first + 1, q] = 4.0 * unit * (turn * turn + rate / square)
+        bends[first + 2, q] = unit
+    return worst**0.125
+
+
+@vector
+def _angular_acceleration_kappa(samples, count, limit, gravity, out):
+    for q in range(count):
+        square = WEIGHTLESS * gravity * gravity
+        along = 0.0
+        snap = 0.0
+        for x in range(3):
+            square += samples[x, 1, q] * samples[x, 1, q]
+            along += samples[x, 1, q] * samples[x, 2, q]
+            snap += samples[x, 1, q] * samples[x, 3, q]
+        size = 0.0
+        for x in range(3):
+            across = samples[x, 2, q] - along / square * samples[x, 1, q]
+            swing = (
+                samples[x, 3, q] - snap / square * samples[x, 1, q] - 2.0 * along / square * across
+            )
+            size += swing * swing
+        out[q] = np.sqrt(size / square) / limit

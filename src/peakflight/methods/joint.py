@@ -1,0 +1,444 @@
+"""The complete problem (Eq. peak_opt_complete): durations and coefficients found together.
+
+The paper states it and approaches it in turns; here it is solved as it stands, by the interior
+point of `kernels.interior`. First every leg is one polynomial; then legs are cut where no limit is
+at work for part of the time, by exact subdivision, and all is solved again from there.
+"""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from peakflight.certificate import peak_ratios, stretch_to_limits
+from peakflight.errors import InvalidProblem, Status
+from peakflight.kernels import basis, interior, unknowns
+from peakflight.kernels.interior import Begin
+from peakflight.kernels.rows import KIND_TERMS
+from peakflight.limits import GRAVITY, KINDS
+from peakflight.methods import Outcome, peak, proportional, require
+from peakflight.methods.idle import idle_times, parts_for
+from peakflight.problem import DEGREES, Problem, derivative_name
+from peakflight.result import History, Plan
+from peakflight.spline import coefficients_of
+from peakflight.trajectory import Trajectory
+
+DEGREE = 7
+"""Degree where the problem leaves it to the method."""
+STARTS = ("guess", "proportional", "peak")
+SAMPLES, SAMPLES_OF_MANY = 16, 12
+"""Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
+ROUGH = 1e-2
+"""Tolerance of a solution that is only cut into pieces."""
+FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, kept=0.0)
+"""From a guess."""
+GOING_ON = Begin(margin=1.02, barrier=0.1, slack=1e-3, kept=0.0)
+"""From a solution: of this problem, or of one with fewer pieces."""
+WARM = Begin(margin=0.0, barrier=0.01, slack=3e-2, kept=1.0)
+"""From the solution of a similar problem."""
+CHUNK = 4
+"""Iterations between looks at the clock, if there is a time limit."""
+TIGHTENINGS = 8
+"""Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
+HOPELESS = 0.2
+"""Excess over a limit that lowering limits is not tried for."""
+ROUNDS = 3
+"""Most rounds of cutting legs."""
+ENOUGH = 1.3
+"""Times the allowance of idle time; a cut for less is not worth its iterations."""
+RETRIES = 2
+"""Runs from where a run has stalled; a new barrier often gets it going."""
+FELL_BACK = "joint found nothing faster than peak, whose plan this is"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Tuning of `joint`."""
+
+    pieces: int | Literal["auto"] = "auto"
+    """Polynomials in each leg; "auto" cuts legs where it pays."""
+    max_pieces: int | None = None
+    """Most polynomials in all; None for no limit of its own (a Crazyflie holds 31)."""
+    effort: float = 0.0
+    """Weight, in s, of the integral of what the problem minimizes (squared jerk or snap): from the
+    fastest, 0, to the smoothest."""
+    initial: Literal["guess", "proportional", "peak"] | Plan = "guess"
+    """Where to begin: from a guess of durations and velocities, from another method's result, or
+    from a plan, best of the same course with something changed."""
+    time_limit: float | None = None
+    """s, after which the best plan so far is returned."""
+    tolerance: float = 1e-4
+    """Relative: of the gap, the stretch and the decrement at which the problem counts as solved."""
+    idle_tolerance: float = 1.5e-3
+    """Part of the flight during which no limit may be at work, before legs are cut for it."""
+    iterations: int = 150
+    """Most iterations of one run; there are a few."""
+
+    def __post_init__(self) -> None:
+        if self.pieces != "auto":
+            if isinstance(self.pieces, bool) or not isinstance(self.pieces, int):
+                raise InvalidProblem(
+                    f"setting pieces is {self.pieces!r}; it must be auto or a whole number"
+                )
+            require("pieces", self.pieces, 1, 1000)
+        if self.max_pieces is not None:
+            require("max_pieces", self.max_pieces, 1, 10**7)
+        require("effort", self.effort, 0.0, 1e9)
+        if not isinstance(self.initial, Plan) and self.initial not in STARTS:
+            raise InvalidProblem(
+                f"setting initial is {self.initial!r}; it must be {', '.join(STARTS)} or a plan"
+            )
+        if self.time_limit is not None:
+            require("time_limit", self.time_limit, 0.0, 1e9)
+        require("tolerance", self.tolerance, 1e-9, 1e-1)
+        require("idle_tolerance", self.idle_tolerance, 1e-6, 1.0)
+        require("iterations", self.iterations, 1, 10**6)
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """What stays the same from run to run."""
+
+    problem: Problem
+    settings: Settings
+    effort: np.ndarray | None
+    """(4,) weight of the integral of each squared derivative; None for none."""
+    deadline: float
+    """By `time.perf_counter`."""
+
+    @property
+    def is_late(self) -> bool:
+        return time.perf_counter() >= self.deadline
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    """A motion to begin from: what `unknowns.set_unknowns` takes."""
+
+    pieces: np.ndarray
+    """(legs,)."""
+    data: np.ndarray
+    """(K, N, 3) end data by time."""
+    starts: np.ndarray
+    """(K, 3) m, where pieces begin, from the first waypoint of their leg."""
+    times: np.ndarray
+    """(K,) s."""
+    dual: np.ndarray | None = None
+    """Multipliers of a similar problem, if they are known."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What came out of one run of the interior point."""
+
+    trajectory: Trajectory
+    pieces: np.ndarray
+    objective: float
+    """Of the trajectory, as far as samples tell."""
+    code: int
+    iterations: int
+    dual: np.ndarray
+    """Multipliers of the constraints."""
+
+
+def kernels(problem: Problem, settings: Settings) -> str:
+    """Those of the kinds of limit and of effort."""
+    turning = any(len(KIND_TERMS[KINDS.index(kind)]) > 1 for kind in problem.limits.active)
+    return f"joint-{'turning' if turning else 'plain'}-{'effort' if settings.effort else 'time'}"
+
+
+def solve(problem: Problem, settings: Settings) -> Outcome:
+    """The fastest trajectory of its class, or the least of time and effort, feasible."""
+    limit = math.inf if settings.time_limit is None else settings.time_limit
+    deadline = time.perf_counter() + limit
+    complete = _complete(problem)
+    task = _Task(complete, settings, _effort(complete, settings), deadline)
+    legs = len(complete.waypoints) - 1
+    if settings.max_pieces is not None and settings.max_pieces < legs:
+        raise InvalidProblem(
+            f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
+        )
+    runs = _runs(task, problem)
+    outcome = _finished(task, runs)
+    if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS):
+        other = peak.solve(_without_class(problem), peak.Settings())
+        if other.status is not Status.INFEASIBLE and (
+            outcome.status is Status.INFEASIBLE
+            or other.trajectory.duration < outcome.trajectory.duration
+        ):
+            outcome = replace(other, status=Status.NO_PROGRESS, message=FELL_BACK)
+            complete = _without_class(problem)
+    iterations = sum(run.iterations for run in runs)
+    return replace(outcome, problem=complete, iterations=iterations, history=_history(runs))
+
+
+def _complete(problem: Problem) -> Problem:
+    """The problem with degree and continuity filled in."""
+    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
+    highest = 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
+    degree = problem.degree
+    if degree is None:
+        degree = min(max(DEGREE, 2 * highest + 1), DEGREES[-1])
+    most = basis.counts(degree)[1] - 1
+    if highest > most:
+        raise InvalidProblem(
+            f"{derivative_name(highest)} is fixed at a waypoint; method joint fixes up to "
+            f"{derivative_name(most)} at degree {degree}"
+        )
+    continuity = most if problem.continuity is None else problem.continuity
+    if continuity > most:
+        raise InvalidProblem(
+            f"continuity is {continuity}; method joint has up to {most} at degree {degree}"
+        )
+    if degree == problem.degree and continuity == problem.continuity:
+        return problem
+    return replace(problem, degree=degree, continuity=continuity)
+
+
+def _without_class(problem: Problem) -> Problem:
+    """The problem for a spline of the natural class."""
+    return replace(problem, degree=None, continuity=None)
+
+
+def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
+    """(4,) weights of the integrals of squared velocity to snap; None if nothing is weighed."""
+    if settings.effort == 0.0:
+        return None
+    weights = np.zeros(4)
+    for order, weight in enumerate(problem.spline_class.weights):
+        if weight > 0.0 and not 1 <= order <= 4:
+            raise InvalidProblem(
+                f"minimize weighs derivative {order}; effort is about 1 to 4, velocity to snap"
+            )
+        if weight > 0.0:
+            weights[order - 1] = settings.effort * weight
+    return weights
+
+
+def _runs(task: _Task, problem: Problem) -> list[_Run]:
+    """Run by run towards the answer: whole legs first, then cut where it pays."""
+    settings = task.settings
+    start, begin = _given(task, problem), FRESH
+    cuts = settings.pieces != 1
+    if start is None:
+        start = _guess(task.problem)
+    elif isinstance(settings.initial, Plan):
+        begin = WARM
+        cuts = cuts and not (start.pieces > 1).any()
+    runs = [_run(task, start, begin, ROUGH if cuts else settings.tolerance)]
+    if cuts and runs[0].code != interior.SOLVED:
+        runs.append(
+            _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
+        )
+    for _ in range(ROUNDS if cuts else 0):
+        last = runs[-1]
+        parts = _parts(task, last)
+        if task.is_late or (parts == 1).all():
+            break
+        trajectory = last.trajectory.subdivide(parts)
+        leg = np.repeat(np.arange(len(last.pieces)), last.pieces)
+        pieces = np.bincount(leg, weights=parts).astype(np.int64)
+        runs.append(_run(task, _start_of(trajectory, pieces, task.problem), GOING_ON))
+        if runs[-1].objective > (1.0 - settings.tolerance) * last.objective:
+            break
+    if cuts and len(runs) == 1:  # nothing to cut
+        runs.append(
+            _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
+        )
+    for _ in range(RETRIES):
+        last = runs[-1]
+        if last.code == interior.SOLVED or task.is_late:
+            break
+        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), GOING_ON))
+    return runs
+
+
+def _parts(task: _Task, run: _Run) -> np.ndarray:
+    """(K,) into how many parts each piece is cut next."""
+    settings = task.settings
+    if settings.pieces != "auto":
+        return np.full(len(run.trajectory), settings.pieces if (run.pieces == 1).all() else 1)
+    idle = idle_times(run.trajectory, task.problem.limits)
+    allowance = settings.idle_tolerance * run.trajectory.duration
+    if idle.sum() < ENOUGH * allowance:
+        return np.ones(len(idle), dtype=np.int64)
+    return parts_for(idle, allowance, settings.max_pieces)
+
+
+def _run(
+    task: _Task,
+    start: _Start,
+    begin: Begin,
+    tolerance: float | None = None,
+    limits: np.ndarray | None = None,
+) -> _Run:
+    """Run the interior point from a start."""
+    problem, settings = task.problem, task.settings
+    class_ = problem.spline_class
+    layout = unknowns.make_layout(
+        problem.waypoints, start.pieces, class_.degree, class_.continuity, problem.fixed
+    )
+    whole = len(start.times) == len(start.pieces)
+    grid = unknowns.make_grid(class_.degree, SAMPLES if whole else SAMPLES_OF_MANY)
+    limits = problem.limits.as_array() if limits is None else limits
+    limited = unknowns.make_limited(limits, task.effort, GRAVITY)
+    work = unknowns.make_work(layout, grid, limited)
+    unknowns.set_unknowns(layout, start.data, start.starts, start.times, work.x)
+    if start.dual is not None and start.dual.shape == work.dual.shape:
+        work.dual[:] = start.dual
+    tolerance = settings.tolerance if tolerance is None else tolerance
+    at_once = settings.iterations if math.isinf(task.deadline) else CHUNK
+    code, left, anew = interior.LIMIT, settings.iterations, True
+    while code == interior.LIMIT and left > 0 and (anew or not task.is_late):
+        many = 0 if task.is_late else min(at_once, left)
+        code = interior.run(layout, grid, limited, work, anew, begin, tolerance, many)
+        left, anew = left - at_once, False
+    x = work.x
+    if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
+        stretch = work.marks[interior.STRETCH]
+        is_time = layout.order < 0
+        x = np.where(
+            is_time, work.best + np.log(stretch), work.best / stretch ** np.maximum(layout.order, 0)
+        )
+    data, starts, times = unknowns.get_data(layout, x)
+    leg = np.repeat(np.arange(len(start.pieces)), start.pieces)
+    orders = basis.row_orders(class_.degree)[:-1]
+    coefficients = coefficients_of(
+        data * times[:, None, None] ** orders[:, None], problem.waypoints[leg] + starts, times
+    )
+    return _Run(
+        Trajectory(coefficients, times),
+        start.pieces,
+        float(work.marks[interior.BEST]),
+        code,
+        int(work.marks[interior.COUNT]),
+        work.dual,
+    )
+
+
+def _finished(task: _Task, runs: list[_Run]) -> Outcome:
+    """The best run, made feasible exactly."""
+    for run in sorted(runs, key=lambda run: run.objective):
+        found, at_rest = None, task.problem.is_at_rest
+        if at_rest:
+            stretched = stretch_to_limits(run.trajectory, task.problem.limits)
+            found = None if stretched is None else stretched[0]
+        else:
+            found = _tightened(task, run)
+        if found is not None:
+            return Outcome(
+                status=_status(task, run),
+                trajectory=found,
+                pieces=tuple(run.pieces.tolist()),
+                memory=run.dual,
+            )
+    return Outcome(
+        status=Status.INFEASIBLE,
+        trajectory=runs[-1].trajectory,
+        pieces=tuple(runs[-1].pieces.tolist()),
+        message="no trajectory within the limits was found"
+        + ("" if task.problem.is_at_rest else " with the motion that is fixed at waypoints"),
+    )
+
+
+def _tightened(task: _Task, run: _Run) -> Trajectory | None:
+    """The answer with motion that is fixed, which rules out the stretch: under lower limits."""
+    limits = task.problem.limits.as_array()
+    kept_low = np.array([kind.name.startswith("least_") for kind in KINDS])
+    lowered = limits.copy()
+    trajectory = run.trajectory
+    for _ in range(TIGHTENINGS):
+        worst = np.nanmax(peak_ratios(trajectory, task.problem.limits), axis=0)
+        excess = np.fmax(worst - 1.0, 0.0)
+        if not excess.any():
+            return trajectory
+        if excess.max() > HOPELESS:
+            return None
+        change = 1.0 - 2.0 * excess - np.where(excess > 0.0, 1e-8, 0.0)
+        lowered = np.where(kept_low, lowered / change, lowered * change)
+        start = _start_of(trajectory, run.pieces, task.problem)
+        trajectory = _run(task, start, WARM, limits=lowered).trajectory
+    return None
+
+
+def _status(task: _Task, run: _Run) -> Status:
+    if run.code == interior.SOLVED:
+        return Status.SOLVED
+    if task.is_late:
+        return Status.TIME_LIMIT
+    return Status.ITERATION_LIMIT if run.code == interior.LIMIT else Status.NO_PROGRESS
+
+
+def _given(task: _Task, problem: Problem) -> _Start | None:
+    """The start that the settings name; None for a guess, also where a plan does not fit."""
+    settings = task.settings
+    legs = len(problem.waypoints) - 1
+    if isinstance(settings.initial, Plan):
+        plan = settings.initial
+        wanted = settings.pieces
+        if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
+            return None
+        moved = problem.waypoints - plan.problem.waypoints
+        start = _start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
+        return replace(start, dual=plan.memory)
+    if settings.initial == "guess":
+        return None
+    method = peak if settings.initial == "peak" else proportional
+    found = method.solve(_without_class(problem), method.Settings())
+    return _start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
+
+
+def _start_of(
+    trajectory: Trajectory, pieces: np.ndarray, problem: Problem, moved: np.ndarray | None = None
+) -> _Start:
+    """A trajectory as a start; waypoints that moved, by (legs+1, 3) m, take joints with them."""
+    degree = problem.spline_class.degree
+    times = trajectory.segment_times
+    powers = times[:, None] ** np.arange(trajectory.degree + 1.0)
+    orders = basis.row_orders(degree)[:-1]
+    scaled = trajectory.coefficients * powers[:, :, None]
+    data = basis.from_monomials(degree, trajectory.degree) @ scaled
+    data /= times[:, None, None] ** orders[:, None]
+    leg = np.repeat(np.arange(len(pieces)), pieces)
+    firsts = np.cumsum(pieces) - pieces
+    begins = trajectory.coefficients[:, 0]
+    starts = begins - begins[firsts][leg]
+    if moved is not None:
+        longer = ((moved[1:] - moved[:-1]) / pieces[:, None])[leg]
+        data[:, 0] += longer
+        starts += (np.arange(len(times)) - firsts[leg])[:, None] * longer
+    return _Start(pieces, data, starts, times)
+
+
+def _guess(problem: Problem) -> _Start:
+    """Durations at the limits of speed and jerk, velocities the means of the legs on both sides."""
+    degree = problem.spline_class.degree
+    left, _ = basis.counts(degree)
+    limits, lengths = problem.limits, problem.leg_lengths
+    times = lengths / limits.speed if limits.speed else np.zeros(len(lengths))
+    if limits.jerk:
+        times = times + np.cbrt(lengths / limits.jerk)
+    elif limits.thrust_acceleration:
+        times = times + np.sqrt(lengths / (limits.thrust_acceleration - GRAVITY))
+    elif limits.snap:
+        times = times + (lengths / limits.snap) ** 0.25
+    steps = np.diff(problem.waypoints, axis=0)
+    mean = steps / times[:, None]
+    velocities = np.zeros_like(problem.waypoints)
+    velocities[1:-1] = (mean[:-1] * times[1:, None] + mean[1:] * times[:-1, None]) / (
+        times[1:] + times[:-1]
+    )[:, None]
+    data = np.zeros((len(times), degree, 3))
+    data[:, 0] = steps
+    data[:, 1] = velocities[:-1]
+    data[:, left] = velocities[1:]
+    return _Start(np.ones(len(times), dtype=np.int64), data, np.zeros((len(times), 3)), times)
+
+
+def _history(runs: list[_Run]) -> History:
+    """Segment times of the runs that had as many pieces as the last."""
+    count = len(runs[-1].trajectory)
+    alike = [run.trajectory.segment_times for run in runs if len(run.trajectory) == count]
+    return History(segment_times=np.array(alike))
