@@ -28,7 +28,7 @@ from peakflight.trajectory import Trajectory
 DEGREE = 7
 """Degree where the problem leaves it to the method."""
 STARTS = ("guess", "proportional", "peak")
-SAMPLES, SAMPLES_OF_MANY = 16, 12
+SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
 ROUGH = 1e-2
 """Tolerance of a solution that is only cut into pieces."""
@@ -71,7 +71,7 @@ class Settings:
     """s, after which the best plan so far is returned."""
     tolerance: float = 1e-4
     """Relative: of the gap, the stretch and the decrement at which the problem counts as solved."""
-    idle_tolerance: float = 1.5e-3
+    idle_tolerance: float = 1.2e-3
     """Part of the flight during which no limit may be at work, before legs are cut for it."""
     iterations: int = 150
     """Most iterations of one run; there are a few."""
