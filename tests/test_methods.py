@@ -72,7 +72,10 @@ def check(made, *, start=None, end=None, samples=300):
     assert made.report.problems == ()
     assert made.message == ""
     assert certify_plan(made).to_dict() == made.report.to_dict()
-    assert made.pieces == (1,) * (len(problem.waypoints) - 1)
+    assert len(made.pieces) == len(problem.waypoints) - 1
+    assert sum(made.pieces) == len(made.trajectory)
+    if made.method != "joint":
+        assert set(made.pieces) == {1}
     assert made.wall_time_s > 0.0
     values = limited_values([trajectory.sample(samples, order) for order in range(1, 5)])
     for name, limit in problem.limits.to_dict().items():
@@ -82,8 +85,10 @@ def check(made, *, start=None, end=None, samples=300):
         assert (made.report.peaks[name] <= 1.0).all()
     at_start, at_end = trajectory.sample(2, 0)[:, 0], trajectory.sample(2, 0)[:, 1]
     size = 1.0 + np.abs(problem.waypoints).max()
-    np.testing.assert_allclose(at_start, problem.waypoints[:-1], rtol=0, atol=1e-9 * size)
-    np.testing.assert_allclose(at_end, problem.waypoints[1:], rtol=0, atol=1e-9 * size)
+    ends = np.cumsum(made.pieces)
+    firsts = ends - made.pieces
+    np.testing.assert_allclose(at_start[firsts], problem.waypoints[:-1], rtol=0, atol=1e-9 * size)
+    np.testing.assert_allclose(at_end[ends - 1], problem.waypoints[1:], rtol=0, atol=1e-9 * size)
     for order in range(1, problem.spline_class.continuity + 1):
         pieces = trajectory.sample(2, order)
         jumps = np.abs(pieces[1:, 0] - pieces[:-1, 1])
@@ -676,7 +681,7 @@ def test_the_registry_names_modules_that_solve():
 
 
 def test_the_default_method_is_peak():
-    assert plan(CORNER, **JERK).method == "peak"
+    assert plan(CORNER, **JERK).method == "joint"
 
 
 @every_method

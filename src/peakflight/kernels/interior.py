@@ -41,9 +41,16 @@ PATIENCE = 15
 """Iterations without gain after which a run ends as stalled; 4 once the gap is closed."""
 STRETCHES = 4
 """Stretches of a start; one does, save for kinds whose stretch is an estimate."""
-STIFFNESS = 10.0
+STIFFNESS, STIFFEST = 10.0, 1e4
 """What the matrix has more than the objective's own curvature in the logarithms of the durations of
-parts of a leg: where a leg is cut matters little, and steps along it would be long."""
+parts of a leg, at least and at most: where a leg is cut matters little, and steps along it would be
+long."""
+UNRULY, TAME = 0.5, 0.1
+"""A piece whose residual exceeds what the step promised by more than this part of what it was is
+stiffened; by less, loosened."""
+NOTICED = 1e-3
+"""Mean residual of a piece below which it counts as tame."""
+STIFFER, LOOSER = 3.0, 0.5
 GAIN = 1e-4
 """Relative fall of the objective that counts as a gain."""
 SOLVED, LIMIT, STALLED = 0, 1, 2
@@ -138,6 +145,8 @@ class Work(NamedTuple):
     """(n, w) H."""
     factor: np.ndarray
     """(n, w)."""
+    stiffness: np.ndarray
+    """(K,) of parts of legs, see `STIFFNESS`; 0 for whole legs."""
     marks: np.ndarray
     """(8,): see the constants below."""
 
@@ -228,6 +237,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
                 break
             if halving < HALVINGS:
                 primal *= 0.5
+        _stiffen(layout, work, residual, slack_step, primal)
         for i in range(x.size):
             x[i] = trial[i]
         marks[COUNT] += 1.0
@@ -286,6 +296,8 @@ def _begin(layout, grid, limited, work, begin):
         slack[i] = max(-values[i], begin.slack)
         central = begin.barrier * time / (values.size * slack[i])
         dual[i] = max(central, begin.kept * dual[i])
+    for k in range(layout.clock.size):
+        work.stiffness[k] = STIFFNESS if layout.steps[k] else 0.0
     marks = work.marks
     for i in range(marks.size):
         marks[i] = 0.0
@@ -296,6 +308,31 @@ def _begin(layout, grid, limited, work, begin):
     marks[DECREMENT] = np.inf
     for i in range(work.x.size):
         work.best[i] = work.x[i]
+
+
+@inner
+def _stiffen(layout, work, residual, slack_step, primal):
+    """Stiffen parts of legs whose constraints do not go where the step was to lead them.
+
+    Snap in a short piece changes with the fourth power of its duration: there the linear picture
+    that a step is made with fails first, and steps that are too long would fail again and again.
+    """
+    values = work.values.reshape(-1)
+    slack = work.slack.reshape(-1)
+    count = residual.size // layout.clock.size
+    for k in range(layout.clock.size):
+        if not layout.steps[k]:
+            continue
+        before = 0.0
+        after = 0.0
+        for i in range(k * count, (k + 1) * count):
+            before += abs(residual[i])
+            after += abs(values[i] + slack[i] + primal * slack_step[i])
+        excess = after - (1.0 - primal) * before
+        if excess > UNRULY * before and after > NOTICED * count:
+            work.stiffness[k] = min(STIFFER * work.stiffness[k], STIFFEST)
+        elif excess < TAME * before or after < NOTICED * count:
+            work.stiffness[k] = max(LOOSER * work.stiffness[k], STIFFNESS)
 
 
 @vector
@@ -512,7 +549,7 @@ def _assemble(layout, grid, limited, work, x):
             weights, work.rates[k], grid.orders, time, grid.table, grid.pairs, wanted,
             grid.products, powers, sums, columns, local,
         )  # fmt: skip
-        local[3 * rows_, 3 * rows_] += time * (1.0 + STIFFNESS if layout.steps[k] else 1.0)
+        local[3 * rows_, 3 * rows_] += time * (1.0 + work.stiffness[k])
         _add_outer(limited.turning, grid, limited, work, k, time, local)
         _add_effort(
             limited.effort, grid, limited, work, k, time, weights, powers, sums, columns, local

@@ -187,5 +187,6 @@ def make_work(layout: Layout, grid: Grid, limited: Limited) -> Work:
         dual=np.zeros(rows),
         matrix=np.empty((unknowns, width)),
         factor=np.empty((unknowns, width)),
+        stiffness=np.empty(pieces),
         marks=np.zeros(MARKS),
     )

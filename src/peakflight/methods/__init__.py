@@ -20,6 +20,8 @@ METHODS = {
     "joint": "durations and coefficients together: the fastest",
 }
 """Name, which is also that of the module, and what it does in a line."""
+DEFAULT_METHOD = "joint"
+"""What plans where none is named."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

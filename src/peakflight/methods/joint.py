@@ -30,7 +30,7 @@ DEGREE = 7
 STARTS = ("guess", "proportional", "peak")
 SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
-ROUGH = 1e-2
+ROUGH = 1e-3
 """Tolerance of a solution that is only cut into pieces."""
 FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, kept=0.0)
 """From a guess."""
@@ -160,6 +160,13 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         raise InvalidProblem(
             f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
         )
+    if settings.max_pieces is not None and settings.pieces != "auto":
+        total = legs * settings.pieces
+        if total > settings.max_pieces:
+            raise InvalidProblem(
+                f"{settings.pieces} pieces in each of {legs} legs are {total}; max_pieces is "
+                f"{settings.max_pieces}"
+            )
     runs = _runs(task, problem)
     outcome = _finished(task, runs)
     if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS):
@@ -235,7 +242,7 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
     for _ in range(ROUNDS if cuts else 0):
         last = runs[-1]
         parts = _parts(task, last)
-        if task.is_late or (parts == 1).all():
+        if last.code != interior.SOLVED or task.is_late or (parts == 1).all():
             break
         trajectory = last.trajectory.subdivide(parts)
         leg = np.repeat(np.arange(len(last.pieces)), last.pieces)
