@@ -93,7 +93,7 @@ def test_limits_are_frozen_floats_in_the_order_of_kinds():
     assert_frozen(limits)
     assert (type(limits.snap), type(limits.speed)) == (float, float)
     assert [kind.name for kind in limits.active] == ["speed", "snap", "tilt"]
-    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, NAN])
+    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, NAN, NAN, NAN])
     assert limits.to_dict() == {"speed": 5.0, "snap": 800.0, "tilt": 0.5}
     assert limits == Limits(speed=5.0, snap=800.0, tilt=0.5)
     assert [field.name for field in dataclasses.fields(Limits)] == [kind.name for kind in KINDS]

@@ -69,6 +69,8 @@ def plan(
     plain = problem.spline_class.is_classical and not problem.derivatives
     variant = getattr(settings, "variant", "only")
     kernels = f"{method}-{variant}-{problem.degree}-{'plain' if plain else 'general'}"
+    if problem.limits.on_turning:
+        kernels += "-turning"
     with jit.announced(kernels, _log):
         impossible = _contradiction(problem)
         outcome = module.solve(problem, settings)
