@@ -31,6 +31,8 @@ GUIDED = 12
 """Subdivisions at the maximum; later ones are in the middle, in case that leads nowhere."""
 NARROW = 0.05
 """In an interval this short F is all but constant: a gap that is rounding alone stays as it is."""
+SLOWEST = -400
+"""Least power of two of the unit of 1 / time: slower motions are small in it, but not yet lost."""
 STEPS = 400
 """Most steps of the search for the stretch that a point needs, and most to close it."""
 NEAREST, FURTHEST = 0.1, 3.0
@@ -186,7 +188,7 @@ def _vectors(order, coefficients, piece, time, degree, gravity, tables, points, 
     """
     errors = np.zeros(3)
     exponents = np.zeros(3, dtype=np.int64)
-    faster = np.int64(-100_000)  # power of two of the unit of 1 / time
+    faster = np.int64(SLOWEST)  # power of two of the unit of 1 / time
     for vector in range(order - 1):
         error, size = control_points(
             coefficients, piece, time, vector + 2, degree, gravity if vector == 0 else 0.0,
@@ -203,8 +205,6 @@ def _vectors(order, coefficients, piece, time, degree, gravity, tables, points, 
         for i in range(degree + 1):
             for d in range(3):
                 stack[0, i, 3 * vector + d] = points[i, d]
-    if faster == -100_000:
-        faster = np.int64(0)
     for vector in range(order - 1):
         scale = 2.0 ** -(exponents[0] + vector * faster)
         errors[vector] *= scale
