@@ -256,6 +256,30 @@ def test_tilt_and_least_thrust_are_kept(method, extra):
 
 @every_method
 @pytest.mark.parametrize(
+    "extra",
+    [
+        {"body_rate": 3.0},
+        {"angular_acceleration": 15.0},
+        {"body_rate": 3.0, "angular_acceleration": 15.0},
+        {"tilt": 0.6, "least_thrust_acceleration": 7.0, "body_rate": 1.0},
+    ],
+    ids="+".join,
+)
+@pytest.mark.parametrize("options", [JERK, SNAP], ids=["jerk", "snap"])
+def test_body_rate_and_angular_acceleration_are_kept(method, extra, options):
+    bound = set()
+    for seed in range(3):
+        waypoints = random_course(np.random.default_rng(seed), 6)
+        free = plan(waypoints, method=method, **options)
+        limits = Limits(**options["limits"].to_dict(), **extra)
+        made = check(plan(waypoints, method=method, **{**options, "limits": limits}))
+        assert made.duration >= free.duration * (1.0 - SAME)
+        bound |= set(made.report.binding)
+    assert bound & {"body_rate", "angular_acceleration"}
+
+
+@every_method
+@pytest.mark.parametrize(
     "limits",
     [
         {"speed": 2.0},
@@ -264,6 +288,8 @@ def test_tilt_and_least_thrust_are_kept(method, extra):
         {"snap": 200.0},
         {"speed": 3.0, "tilt": 0.5},
         {"speed": 3.0, "least_thrust_acceleration": 8.0},
+        {"speed": 3.0, "body_rate": 2.0},
+        {"speed": 3.0, "angular_acceleration": 10.0},
     ],
     ids="+".join,
 )
@@ -296,9 +322,10 @@ def test_peak_is_no_slower_than_where_it_starts(seed):
     ],
     ids=["up", "down", "down and up", "up and down"],
 )
-def test_straight_up_and_down_with_a_tilt_limit(method, waypoints):
-    """Tilt stays zero, but for free fall, where it is not defined."""
-    limits = Limits(speed=20.0, thrust_acceleration=30.0, jerk=500.0, snap=20_000.0, tilt=0.5)
+def test_straight_up_and_down_with_limits_on_the_thrust_direction(method, waypoints):
+    """It stays upright, but for free fall, where it is not defined."""
+    limits = Limits(speed=20.0, thrust_acceleration=30.0, jerk=500.0, snap=20_000.0, tilt=0.5,
+                    body_rate=5.0, angular_acceleration=50.0)  # fmt: skip
     check(plan(np.array(waypoints, dtype=float), method=method, limits=limits))
 
 
@@ -431,6 +458,18 @@ def test_fixed_motion_beyond_a_limit_is_infeasible_and_says_why(method, fixed, m
     assert len(made.report.problems) >= 1
     assert np.isfinite(made.trajectory.coefficients).all()
     assert Plan.from_dict(json.loads(json.dumps(made.to_dict()))).status is Status.INFEASIBLE
+
+
+@every_method
+def test_fixed_motion_that_turns_too_fast_is_infeasible_and_says_why(method):
+    waypoints = random_course(np.random.default_rng(5), 4)
+    limits = Limits(speed=5.0, thrust_acceleration=15.5, body_rate=1.0)
+    start = {"velocity": [0, 0, 0], "acceleration": [0, 0, 0], "jerk": [GRAVITY * 2, 0, 0]}
+    made = plan(waypoints, method=method, limits=limits, minimize="snap", start=start)
+    assert made.status is Status.INFEASIBLE
+    assert made.message.startswith(
+        "the motion fixed at waypoint 0 has body_rate = 2 against a limit of 1"
+    )
 
 
 @every_method

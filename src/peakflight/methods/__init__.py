@@ -69,9 +69,10 @@ def require(name: str, value: float, low: float, high: float) -> None:
 
 
 def spline_kernels(problem: Problem) -> str:
-    """Which kernels solve the spline of a problem."""
+    """Which kernels solve the spline of a problem and look at its limits."""
     plain = problem.spline_class.is_classical and not problem.derivatives
-    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}"
+    turning = "-turning" if problem.limits.on_turning else ""
+    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}{turning}"
 
 
 def find(name: str) -> Method:

@@ -16,7 +16,6 @@ from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
 from peakflight.kernels.interior import Begin
-from peakflight.kernels.rows import KIND_TERMS
 from peakflight.limits import GRAVITY, KINDS
 from peakflight.methods import Outcome, peak, proportional, require
 from peakflight.methods.idle import idle_times, parts_for
@@ -145,8 +144,8 @@ class _Run:
 
 def kernels(problem: Problem, settings: Settings) -> str:
     """Those of the kinds of limit and of effort."""
-    turning = any(len(KIND_TERMS[KINDS.index(kind)]) > 1 for kind in problem.limits.active)
-    return f"joint-{'turning' if turning else 'plain'}-{'effort' if settings.effort else 'time'}"
+    turning = "turning" if problem.limits.on_turning else "plain"
+    return f"joint-{turning}-{'effort' if settings.effort else 'time'}"
 
 
 def solve(problem: Problem, settings: Settings) -> Outcome:
