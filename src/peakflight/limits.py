@@ -1,8 +1,9 @@
 """The kinds of limit that a trajectory can be held to, and the values of one vehicle.
 
 `Limits` is an open set: a kind is one entry of `KINDS`, one optional field of `Limits`, one unit
-in `kernels/measures.py` (what the optimisers see) and one in `kernels/bounds.py` (what the
-certificate proves). Everything else, from the report to the command line, goes through `KINDS`.
+in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joint` sees) and one in
+`kernels/bounds.py` (what the certificate proves). Everything else, from the report to the command
+line, goes through `KINDS`.
 """
 
 import math

@@ -38,7 +38,8 @@ NEARNESS = 5e-3
 DEEPEST = 0.5
 """No limit is lowered below this part of itself."""
 PATIENCE = 15
-"""Iterations without gain after which a run ends as stalled; 4 once the gap is closed."""
+"""Iterations without gain after which a run ends: as solved if only its stretch, up to ten times
+the tolerance, is in the way; else as stalled."""
 STRETCHES = 4
 """Stretches of a start; one does, save for kinds whose stretch is an estimate."""
 STIFFNESS, STIFFEST = 10.0, 1e4
@@ -116,6 +117,8 @@ class Limited(NamedTuple):
     """(4,) weight of the integral of each squared derivative in the objective; None likewise."""
     gravity: np.ndarray
     """(1,) m/s^2."""
+    least: np.ndarray
+    """(1,) smallest stretch of interest: 1 where going faster is not for free, else 0."""
 
 
 class Work(NamedTuple):
@@ -259,16 +262,18 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
         if marks[BEST] < marks[REFERENCE] * (1.0 - GAIN):
             marks[REFERENCE] = marks[BEST]
             marks[LAST] = marks[COUNT]
-        if marks[LOWERED] > 0.0 and marks[GAP] < tolerance:
+        closed = marks[LOWERED] > 0.0 and marks[GAP] < tolerance
+        if closed:
             _gradient(layout, grid, limited, work, x, dual, step)
             for i in range(x.size):
                 trial[i] = step[i]
             band.solve(work.factor, trial)
             marks[DECREMENT] = 0.5 * _product_of(trial, step) / (time + effort)
-            if marks[DECREMENT] < tolerance and needed < 1.0 + tolerance:
+            closed = marks[DECREMENT] < tolerance
+            if closed and needed < 1.0 + tolerance:
                 return SOLVED
         if marks[GAP] < 10.0 * tolerance and marks[COUNT] - marks[LAST] >= PATIENCE:
-            return SOLVED if marks[DECREMENT] < tolerance else STALLED
+            return SOLVED if closed and needed < 1.0 + 10.0 * tolerance else STALLED
     return LIMIT
 
 
@@ -403,7 +408,7 @@ def _evaluate(layout, grid, limited, work, x):
     """Samples and constraints at x; returns the stretch that they need, total time and effort."""
     count = grid.table.shape[2]
     data = np.empty((grid.orders.size, 3))
-    needed = 0.0
+    needed = limited.least[0]
     total = 0.0
     effort = 0.0
     for k in range(layout.clock.size):
