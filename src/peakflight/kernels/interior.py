@@ -38,8 +38,8 @@ NEARNESS = 5e-3
 DEEPEST = 0.5
 """No limit is lowered below this part of itself."""
 PATIENCE = 15
-"""Iterations without gain after which a run ends: as solved if only its stretch, up to ten times
-the tolerance, is in the way; else as stalled."""
+"""Iterations without gain after which a run ends: as solved if only the stretch is in the way, of
+the best iterate up to ten times the tolerance; else as stalled."""
 STRETCHES = 4
 """Stretches of a start; one does, save for kinds whose stretch is an estimate."""
 STIFFNESS, STIFFEST = 10.0, 1e4
@@ -170,6 +170,10 @@ class Begin(NamedTuple):
     """Weight of all constraints together, mu times their number, as a part of the total time."""
     slack: float
     """Least slack that a constraint starts with."""
+    stiffness: float
+    """Of whole legs, see `STIFFNESS`; parts of legs have it anyway."""
+    slowly: float
+    """Part of the way that lowered limits move in an iteration: all at once, some would swing."""
     kept: float
     """1 if work.dual holds multipliers of a similar problem, which are then kept where they are
     larger than mu over the slack; else 0."""
@@ -245,7 +249,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
             x[i] = trial[i]
         marks[COUNT] += 1.0
         if marks[GAP] < NEARNESS:
-            _lower(layout, grid, limited, work, x)
+            _lower(layout, grid, limited, work, x, begin.slowly)
             needed, time, effort = _evaluate(layout, grid, limited, work, x)
             objective = time * needed + effort
             if marks[LOWERED] == 0.0:
@@ -273,7 +277,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
             if closed and needed < 1.0 + tolerance:
                 return SOLVED
         if marks[GAP] < 10.0 * tolerance and marks[COUNT] - marks[LAST] >= PATIENCE:
-            return SOLVED if closed and needed < 1.0 + 10.0 * tolerance else STALLED
+            return SOLVED if closed and marks[STRETCH] < 1.0 + 10.0 * tolerance else STALLED
     return LIMIT
 
 
@@ -302,7 +306,7 @@ def _begin(layout, grid, limited, work, begin):
         central = begin.barrier * time / (values.size * slack[i])
         dual[i] = max(central, begin.kept * dual[i])
     for k in range(layout.clock.size):
-        work.stiffness[k] = STIFFNESS if layout.steps[k] else 0.0
+        work.stiffness[k] = STIFFNESS if layout.steps[k] else begin.stiffness
     marks = work.marks
     for i in range(marks.size):
         marks[i] = 0.0
@@ -326,7 +330,7 @@ def _stiffen(layout, work, residual, slack_step, primal):
     slack = work.slack.reshape(-1)
     count = residual.size // layout.clock.size
     for k in range(layout.clock.size):
-        if not layout.steps[k]:
+        if work.stiffness[k] == 0.0:
             continue
         before = 0.0
         after = 0.0
@@ -649,7 +653,7 @@ def _scatter(layout, k, local, matrix):
 
 
 @within
-def _lower(layout, grid, limited, work, x):
+def _lower(layout, grid, limited, work, x, slowly):
     """Lower the limit of each sample by how much more than the sample its cell reaches."""
     count = grid.table.shape[2]
     cells = grid.dense.shape[2] // count
@@ -681,7 +685,8 @@ def _lower(layout, grid, limited, work, x):
                             value += (right - left) ** 2 / (8.0 * curve)
                     peak = max(peak, value)
                 ratio = min(max(there[q] / peak, DEEPEST), 1.0)
-                work.limits[k, r, q] = limit / ratio if kind == LEAST else limit * ratio
+                lowered = limit / ratio if kind == LEAST else limit * ratio
+                work.limits[k, r, q] += slowly * (lowered - work.limits[k, r, q])
 
 
 LEAST = 5

@@ -31,11 +31,13 @@ SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
 ROUGH = 1e-3
 """Tolerance of a solution that is only cut into pieces."""
-FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, kept=0.0)
+FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, stiffness=0.0, slowly=1.0, kept=0.0)
 """From a guess."""
-GOING_ON = Begin(margin=1.02, barrier=0.1, slack=1e-3, kept=0.0)
-"""From a solution: of this problem, or of one with fewer pieces."""
-WARM = Begin(margin=0.0, barrier=0.01, slack=3e-2, kept=1.0)
+GOING_ON = FRESH._replace(margin=1.02, barrier=0.1)
+"""From a solution: of this problem with fewer pieces."""
+AGAIN = GOING_ON._replace(stiffness=10.0, slowly=0.5)
+"""From where a run has stalled."""
+WARM = FRESH._replace(margin=0.0, barrier=0.01, slack=3e-2, kept=1.0)
 """From the solution of a similar problem."""
 CHUNK = 4
 """Iterations between looks at the clock, if there is a time limit."""
@@ -55,7 +57,7 @@ GAIN_OF_CUT = 1e-3
 """Relative gain of a cut below which legs are not cut again."""
 FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
-RETRIES = 2
+RETRIES = 4
 """Runs from where a run has stalled; a new barrier often gets it going."""
 FELL_BACK = "joint found nothing faster than peak, whose plan this is"
 
@@ -270,7 +272,7 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         last = runs[-1]
         if last.solved or task.is_late:
             break
-        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), GOING_ON))
+        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), AGAIN))
     return runs
 
 
@@ -314,7 +316,7 @@ def _run(
     if start.dual is not None and start.dual.shape == work.dual.shape:
         work.dual[:] = start.dual
     tolerance = settings.tolerance if tolerance is None else tolerance
-    if not problem.is_at_rest and begin is GOING_ON:
+    if not problem.is_at_rest and begin in (GOING_ON, AGAIN):
         begin = begin._replace(margin=0.0, slack=WARM.slack)
     at_once = settings.iterations if math.isinf(task.deadline) else CHUNK
     code, left, anew = interior.LIMIT, settings.iterations, True
