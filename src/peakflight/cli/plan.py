@@ -56,9 +56,8 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--method",
     type=click.Choice(tuple(METHODS)),
-    default=DEFAULT_METHOD,
-    show_default=True,
-    help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items()) + ".",
+    help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items())
+    + f". Default: {DEFAULT_METHOD}, or the method that a given option is of.",
 )
 @click.option(
     "--variant",
@@ -109,7 +108,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @common_options
 def plan(
     course: Path,
-    method: str,
+    method: str | None,
     variant: str | None,
     pieces: int | str | None,
     max_pieces: int | None,
@@ -142,7 +141,7 @@ def plan(
         "time_limit": time_limit,
     }
     tuning = {name: value for name, value in tuning.items() if value is not None}
-    _check_tuning(method, tuning)
+    method = _method(method, tuning)
     with Progress() as progress:
         progress.stage("reading the course")
         read, notes = _read(course, strict)
@@ -202,13 +201,17 @@ def _read(path: Path, strict: bool) -> tuple[Course, tuple[str, ...]]:
         raise InvalidFile(f"{path}: {error}") from None
 
 
-def _check_tuning(method: str, tuning: dict[str, Any]) -> None:
-    """Refuse options of other methods."""
+def _method(method: str | None, tuning: dict[str, Any]) -> str:
+    """The method to plan with; options of other methods are refused."""
+    owners = {option: owner for owner, options in METHOD_OPTIONS.items() for option in options}
     for name in tuning:
-        owners = [owner for owner, options in METHOD_OPTIONS.items() if name in options]
-        if method not in owners:
+        method = method or owners[name]
+        if method != owners[name]:
             option = f"--{name.replace('_', '-')}"
-            raise click.UsageError(f"{option} is of method {owners[0]}; method {method} has none")
+            raise click.UsageError(
+                f"{option} is of method {owners[name]}; method {method} has none"
+            )
+    return method or DEFAULT_METHOD
 
 
 def _solve(problem: Problem, method: str, tuning: dict[str, Any]) -> Plan:

@@ -388,9 +388,9 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
     lowered = limits.as_array()
     best, answer = None, run
     for _ in range(NARROWINGS):
-        found = run.trajectory
-        if task.effort is None or _excess(task, found).any():
-            stretched = stretch_to_limits(found, limits)
+        found: Trajectory | None = run.trajectory
+        if task.effort is None or _excess(task, run.trajectory).any():
+            stretched = stretch_to_limits(run.trajectory, limits)
             found = None if stretched is None else stretched[0]
         if found is not None and (best is None or found.duration < best.duration):
             best, answer = found, run
