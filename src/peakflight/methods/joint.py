@@ -350,7 +350,7 @@ def _tightened(task: _Task, run: _Run) -> Trajectory | None:
     lowered = limits.copy()
     trajectory = run.trajectory
     for _ in range(TIGHTENINGS):
-        worst = np.nanmax(peak_ratios(trajectory, task.problem.limits), axis=0)
+        worst = np.fmax.reduce(peak_ratios(trajectory, task.problem.limits))
         excess = np.fmax(worst - 1.0, 0.0)
         if not excess.any():
             return trajectory
