@@ -156,10 +156,13 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     complete = _complete(problem)
     task = _Task(complete, settings, _effort(complete, settings), deadline)
     legs = len(complete.waypoints) - 1
-    if settings.max_pieces is not None and settings.max_pieces < legs:
-        raise InvalidProblem(
-            f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
-        )
+    if settings.max_pieces is not None:
+        each = 1 if settings.pieces == "auto" else settings.pieces
+        if settings.max_pieces < each * legs:
+            raise InvalidProblem(
+                f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs "
+                f"{'one' if each == 1 else each}"
+            )
     runs = _runs(task, problem)
     outcome = _finished(task, runs)
     if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS):
@@ -379,6 +382,8 @@ def _given(task: _Task, problem: Problem) -> _Start | None:
         plan = settings.initial
         wanted = settings.pieces
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
+            return None
+        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         moved = problem.waypoints - plan.problem.waypoints
         start = _start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
