@@ -18,7 +18,7 @@ from peakflight.kernels import basis, interior, unknowns
 from peakflight.kernels.interior import Begin
 from peakflight.kernels.rows import KIND_TERMS
 from peakflight.limits import GRAVITY, KINDS
-from peakflight.methods import Outcome, peak, proportional, require
+from peakflight.methods import Outcome, peak, proportional, require, require_whole
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.problem import DEGREES, Problem, derivative_name
 from peakflight.result import History, Plan
@@ -78,15 +78,16 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.pieces != "auto":
-            if isinstance(self.pieces, bool) or not isinstance(self.pieces, int):
+            if isinstance(self.pieces, str):
                 raise InvalidProblem(
                     f"setting pieces is {self.pieces!r}; it must be auto or a whole number"
                 )
-            require("pieces", self.pieces, 1, 1000)
+            require_whole("pieces", self.pieces, 1, 1000)
         if self.max_pieces is not None:
-            require("max_pieces", self.max_pieces, 1, 10**7)
+            require_whole("max_pieces", self.max_pieces, 1, 10**7)
         require("effort", self.effort, 0.0, 1e9)
-        if not isinstance(self.initial, Plan) and self.initial not in STARTS:
+        named = isinstance(self.initial, str) and self.initial in STARTS
+        if not (named or isinstance(self.initial, Plan)):
             raise InvalidProblem(
                 f"setting initial is {self.initial!r}; it must be {', '.join(STARTS)} or a plan"
             )
@@ -94,7 +95,7 @@ class Settings:
             require("time_limit", self.time_limit, 0.0, 1e9)
         require("tolerance", self.tolerance, 1e-9, 1e-1)
         require("idle_tolerance", self.idle_tolerance, 1e-6, 1.0)
-        require("iterations", self.iterations, 1, 10**6)
+        require_whole("iterations", self.iterations, 1, 10**6)
 
 
 @dataclass(frozen=True, eq=False)
