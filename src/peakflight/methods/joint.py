@@ -15,7 +15,7 @@ import numpy as np
 from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
-from peakflight.kernels.interior import Begin
+from peakflight.kernels.interior import Begin, Layout
 from peakflight.kernels.rows import KIND_TERMS
 from peakflight.limits import GRAVITY, KINDS
 from peakflight.methods import Outcome, peak, proportional, require, require_whole
@@ -23,7 +23,7 @@ from peakflight.methods.idle import idle_times, parts_for
 from peakflight.problem import DEGREES, Problem, derivative_name
 from peakflight.result import History, Plan
 from peakflight.spline import coefficients_of
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
 DEGREE = 7
 """Degree where the problem leaves it to the method."""
@@ -300,6 +300,8 @@ def _run(
         code = interior.run(layout, grid, limited, work, anew, begin, tolerance, many)
         left, anew = left - at_once, False
     x = work.x
+    if not _is_sound(layout, x):  # gone astray
+        x, code = work.best, interior.STALLED
     if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
         stretch = work.marks[interior.STRETCH]
         is_time = layout.order < 0
@@ -319,6 +321,16 @@ def _run(
         code,
         int(work.marks[interior.COUNT]),
         work.dual,
+    )
+
+
+def _is_sound(layout: Layout, x: np.ndarray) -> bool:
+    """Whether unknowns are numbers that a trajectory can have."""
+    times = x[layout.clock]
+    return bool(
+        np.isfinite(x).all()
+        and (times > math.log(SHORTEST)).all()
+        and (times < math.log(LONGEST)).all()
     )
 
 
