@@ -166,13 +166,14 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
             )
     runs = _runs(task, problem)
     outcome = _finished(task, runs)
-    if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS):
+    if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS, Status.ITERATION_LIMIT):
         other = peak.solve(_without_class(problem), peak.Settings())
         if other.status is not Status.INFEASIBLE and (
             outcome.status is Status.INFEASIBLE
-            or other.trajectory.duration < outcome.trajectory.duration
+            or (task.effort is None and other.trajectory.duration < outcome.trajectory.duration)
         ):
-            outcome = replace(other, status=Status.NO_PROGRESS, message=FELL_BACK)
+            status = Status.TIME_LIMIT if task.is_late else Status.NO_PROGRESS
+            outcome = replace(other, status=status, message=FELL_BACK)
             complete = _without_class(problem)
     iterations = sum(run.iterations for run in runs)
     return replace(outcome, problem=complete, iterations=iterations, history=_history(runs))
