@@ -366,7 +366,7 @@ def _evaluate(layout, grid, limited, work, x):
     """Samples and constraints at x; returns the stretch that they need, total time and effort."""
     count = grid.table.shape[2]
     data = np.empty((grid.orders.size, 3))
-    needed = 0.0
+    needed = 0.0 if limited.effort is None else 1.0  # what is weighed against time may be slow
     total = 0.0
     effort = 0.0
     for k in range(layout.clock.size):

@@ -304,7 +304,7 @@ def _run(
     if not _is_sound(layout, x):  # gone astray
         x, code = work.best, interior.STALLED
     if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
-        stretch = work.marks[interior.STRETCH]
+        stretch = work.marks[interior.STRETCH]  # at least 1 with effort
         is_time = layout.order < 0
         x = np.where(
             is_time, work.best + np.log(stretch), work.best / stretch ** np.maximum(layout.order, 0)
@@ -342,6 +342,8 @@ def _finished(task: _Task, runs: list[_Run]) -> Outcome:
         if at_rest:
             stretched = stretch_to_limits(run.trajectory, task.problem.limits)
             found = None if stretched is None else stretched[0]
+            if stretched is not None and task.effort is not None and stretched[1] < 1.0:
+                found = run.trajectory  # no faster than it wants to be
         else:
             found = _tightened(task, run)
         if found is not None:
