@@ -303,6 +303,8 @@ def _run(
     x = work.x
     if not _is_sound(layout, x):  # gone astray
         x, code = work.best, interior.STALLED
+        if not _is_sound(layout, x):
+            unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
     if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
         stretch = work.marks[interior.STRETCH]  # at least 1 with effort
         is_time = layout.order < 0
