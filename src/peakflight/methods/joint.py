@@ -181,8 +181,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
 
 def _complete(problem: Problem) -> Problem:
     """The problem with degree and continuity filled in."""
-    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
-    highest = 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
+    highest = _highest(problem)
     degree = problem.degree
     if degree is None:
         degree = min(max(DEGREE, 2 * highest + 1), DEGREES[-1])
@@ -202,9 +201,21 @@ def _complete(problem: Problem) -> Problem:
     return replace(problem, degree=degree, continuity=continuity)
 
 
+def _highest(problem: Problem) -> int:
+    """The highest derivative that is fixed at a waypoint; 0 if none is."""
+    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
+    return 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
+
+
 def _without_class(problem: Problem) -> Problem:
-    """The problem for a spline of the natural class."""
-    return replace(problem, degree=None, continuity=None)
+    """The problem for a spline of the natural class, of a cost that leaves room for what is fixed.
+
+    The optimum for a cost on the r-th derivative holds derivatives up to the one before.
+    """
+    highest = _highest(problem)
+    if highest < problem.spline_class.cost_order:
+        return replace(problem, degree=None, continuity=None)
+    return replace(problem, minimize={highest + 1: 1.0}, degree=None, continuity=None)
 
 
 def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
