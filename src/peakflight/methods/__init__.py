@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
 
+import numpy as np
+
 from peakflight.errors import InvalidProblem, Status
 from peakflight.problem import Problem
 from peakflight.result import History
@@ -64,8 +66,19 @@ def require(name: str, value: float, low: float, high: float) -> None:
     InvalidProblem
         If it is not a number from `low` to `high`.
     """
-    if not low <= value <= high:
+    try:
+        within = bool(low <= value <= high)
+    except (TypeError, ValueError):
+        within = False
+    if not within:
         raise InvalidProblem(f"setting {name} is {value!r}; it must be from {low:g} to {high:g}")
+
+
+def require_whole(name: str, value: int, low: int, high: int) -> None:
+    """As `require`, for what is counted."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise InvalidProblem(f"setting {name} is {value!r}; it must be a whole number")
+    require(name, value, low, high)
 
 
 def spline_kernels(problem: Problem) -> str:

@@ -15,9 +15,9 @@ import numpy as np
 from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
-from peakflight.kernels.interior import Begin
+from peakflight.kernels.interior import Begin, Layout
 from peakflight.limits import GRAVITY, KINDS
-from peakflight.methods import Outcome, peak, proportional, require
+from peakflight.methods import Outcome, peak, proportional, require, require_whole
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.problem import DEGREES, Problem, SplineClass, derivative_name
 from peakflight.result import History, Plan
@@ -88,15 +88,16 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.pieces != "auto":
-            if isinstance(self.pieces, bool) or not isinstance(self.pieces, int):
+            if isinstance(self.pieces, str):
                 raise InvalidProblem(
                     f"setting pieces is {self.pieces!r}; it must be auto or a whole number"
                 )
-            require("pieces", self.pieces, 1, 1000)
+            require_whole("pieces", self.pieces, 1, 1000)
         if self.max_pieces is not None:
-            require("max_pieces", self.max_pieces, 1, 10**7)
+            require_whole("max_pieces", self.max_pieces, 1, 10**7)
         require("effort", self.effort, 0.0, 1e9)
-        if not isinstance(self.initial, Plan) and self.initial not in STARTS:
+        named = isinstance(self.initial, str) and self.initial in STARTS
+        if not (named or isinstance(self.initial, Plan)):
             raise InvalidProblem(
                 f"setting initial is {self.initial!r}; it must be {', '.join(STARTS)} or a plan"
             )
@@ -104,7 +105,7 @@ class Settings:
             require("time_limit", self.time_limit, 0.0, 1e9)
         require("tolerance", self.tolerance, 1e-9, 1e-1)
         require("idle_tolerance", self.idle_tolerance, 1e-6, 1.0)
-        require("iterations", self.iterations, 1, 10**6)
+        require_whole("iterations", self.iterations, 1, 10**6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +185,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     runs = _runs(task, problem)
     outcome = _finished(task, runs)
     infeasible = outcome.status is Status.INFEASIBLE
-    doubtful = outcome.status is Status.NO_PROGRESS or (legs <= FEW and settings.pieces == 1)
+    doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
     if infeasible or (doubtful and task.effort is None):
         other = peak.solve(_without_class(problem), peak.Settings())
         found = other.status is not Status.INFEASIBLE
@@ -198,8 +199,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
 
 def _complete(problem: Problem) -> Problem:
     """The problem with degree and continuity filled in."""
-    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
-    highest = 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
+    highest = _highest(problem)
     degree = problem.degree
     if degree is None:
         degree = min(max(DEGREE, 2 * highest + 1), DEGREES[-1])
@@ -219,9 +219,21 @@ def _complete(problem: Problem) -> Problem:
     return replace(problem, degree=degree, continuity=continuity)
 
 
+def _highest(problem: Problem) -> int:
+    """The highest derivative that is fixed at a waypoint; 0 if none is."""
+    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
+    return 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
+
+
 def _without_class(problem: Problem) -> Problem:
-    """The problem for a spline of the natural class."""
-    return replace(problem, degree=None, continuity=None)
+    """The problem for a spline of the natural class, of a cost that leaves room for what is fixed.
+
+    The optimum for a cost on the r-th derivative holds derivatives up to the one before.
+    """
+    highest = _highest(problem)
+    if highest < problem.spline_class.cost_order:
+        return replace(problem, degree=None, continuity=None)
+    return replace(problem, minimize={highest + 1: 1.0}, degree=None, continuity=None)
 
 
 def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
@@ -325,14 +337,16 @@ def _run(
         code = interior.run(layout, grid, limited, work, anew, begin, tolerance, many)
         left, anew = left - at_once, False
     x = work.x
-    if not np.isfinite(x).all():
-        unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
+    if not _is_sound(layout, x):  # gone astray
+        x, code = work.best, interior.STALLED
     if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
         stretch = work.marks[interior.STRETCH]
         is_time = layout.order < 0
         x = np.where(
             is_time, work.best + np.log(stretch), work.best / stretch ** np.maximum(layout.order, 0)
         )
+    if not _is_sound(layout, x):
+        unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
     data, starts, times = unknowns.get_data(layout, x)
     ended = code == interior.SOLVED
     times = np.clip(
@@ -352,6 +366,16 @@ def _run(
         code,
         int(work.marks[interior.COUNT]),
         work.dual,
+    )
+
+
+def _is_sound(layout: Layout, x: np.ndarray) -> bool:
+    """Whether unknowns are numbers that a trajectory can have."""
+    times = x[layout.clock]
+    return bool(
+        np.isfinite(x).all()
+        and (times > math.log(SHORTEST)).all()
+        and (times < math.log(LONGEST)).all()
     )
 
 
