@@ -6,14 +6,14 @@ from typing import Any
 
 import click
 
+from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option
+from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
-from peakflight.course import Course, tidy
-from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
-from peakflight.formats import FLIGHT_WRITERS, read_course
+from peakflight.errors import InvalidProblem, MissingExtra
+from peakflight.formats import FLIGHT_WRITERS
 from peakflight.limits import Limits
 from peakflight.methods import METHODS
 from peakflight.problem import Problem
@@ -44,15 +44,7 @@ VARIANTS = ("descent", "paper")
     help="Of method peak: descent, the default, or the paper's Algorithm 1.",
 )
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
-@click.option(
-    "--minimize",
-    type=click.Choice(("jerk", "snap", "acceleration")),
-    default="jerk",
-    show_default=True,
-    help="Derivative whose square the spline minimizes.",
-)
-@click.option("--degree", type=int, help="Degree of the polynomials; by default the cost's own.")
-@click.option("--continuity", type=int, help="Highest derivative that is continuous.")
+@spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option(
     "--export",
@@ -97,7 +89,7 @@ def plan(
         raise click.UsageError(f"--variant is of method peak; method {method} has none")
     with Progress() as progress:
         progress.stage("reading the course")
-        read, notes = _read(course, strict)
+        read, notes = read_tidied(course, strict=strict)
         problem = Problem(
             read.waypoints,
             limits=limits or PAPER_LIMITS,
@@ -121,7 +113,7 @@ def plan(
                 drawn, why_not = _draw(answer, folder)
                 files, more = {**files, **drawn}, (*more, *why_not)
         if read.times is not None:
-            notes = (*notes, "the times in the course are not used: the planner finds its own")
+            notes = (*notes, UNUSED_TIMES)
         stale = _stale(folder, files)
         if stale:
             more = (*more, f"from an earlier run in this folder: {', '.join(stale)}")
@@ -144,14 +136,6 @@ def plan(
     if not answer.feasible:
         click.echo(f"peakflight: no feasible trajectory ({answer.status})", err=True)
     return 0 if answer.feasible else 1
-
-
-def _read(path: Path, strict: bool) -> tuple[Course, tuple[str, ...]]:
-    course = read_course(path)
-    try:
-        return tidy(course, strict=strict)
-    except InvalidProblem as error:
-        raise InvalidFile(f"{path}: {error}") from None
 
 
 def _solve(problem: Problem, method: str, variant: str | None) -> Plan:
