@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 .PHONY: demo test check format bench docs clean
 
 demo: $(STAMP) ## plan a real racing course, prove it, and write flight file and pictures
-	$(BIN)/peakflight plan examples/courses/uzh_19wp.json -o out/demo
+	$(BIN)/peakflight plan examples/courses/uzh_19wp.json --max-pieces 31 -o out/demo
 	$(BIN)/peakflight check out/demo/plan.json
 	@echo "Look at out/demo/course.png; fly out/demo/crazyflie.csv."
 
