@@ -10,8 +10,10 @@ limits = pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
 
 plan = pf.plan(waypoints, limits=limits)
 print(f"{plan.status}: {plan.duration:.3f} s, certified: {plan.report.feasible}")
-for leg, (seconds, limit) in enumerate(zip(plan.segment_times, plan.report.binding, strict=True)):
-    print(f"leg {leg}: {seconds:.3f} s, closest to its limit: {limit}")
+pieces = iter(zip(plan.segment_times, plan.report.binding, strict=True))
+for leg, count in enumerate(plan.pieces):
+    for seconds, limit in (next(pieces) for _ in range(count)):
+        print(f"leg {leg}: a piece of {seconds:.3f} s, closest to its limit: {limit}")
 
 position = plan.trajectory(0.5)
 thrust = plan.trajectory(0.5, derivative=2)

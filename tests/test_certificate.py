@@ -26,7 +26,7 @@ from peakflight import (
     stretch_to_limits,
 )
 from peakflight.certificate import TOLERANCE, peak_ratios
-from peakflight.kernels import bounds
+from peakflight.kernels import bounds, turning
 from peakflight.limits import limited_values
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE
 
@@ -38,7 +38,8 @@ CLOSE = 1e-9
 """How far above an attained value a bound of kappa may be, relative."""
 ROUNDING = Fraction(1, 10**12)
 """Of the square of a bound, relative to the square of the size of its terms."""
-QUOTIENTS = ("tilt", "least_thrust_acceleration")
+QUOTIENTS = ("tilt", "least_thrust_acceleration", "body_rate", "angular_acceleration")
+TURNS = ("body_rate", "angular_acceleration")
 CAP = 1e9
 """Kappa where no bound exists."""
 
@@ -48,10 +49,10 @@ def kernel_bounds(coefficients, times, limits):
     shape = (len(times), len(KINDS))
     upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
     degree = coefficients.shape[1] - 1
-    tables = (*bounds.bernstein_tables(degree), bounds.falling_factorials(degree))
+    tables, limits = bounds.lookup_tables(degree), np.array(limits)
     bounds.certify(
-        coefficients, np.array(times), np.array(limits), GRAVITY, tables, TOLERANCE, upper, lower,
-        place,
+        coefficients, np.array(times), limits, GRAVITY, tables, TOLERANCE, upper, lower, place,
+        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None,
     )  # fmt: skip
     return upper, lower, place
 
@@ -108,6 +109,24 @@ def near_free_fall(rng, size):
     return piece
 
 
+def free_fall_within(rng, size):
+    """Thrust all but vanishes at one point; in normalised time, for h = 1."""
+    piece = rng.normal(size=(size, 3)) * np.array([1.0, 1.0, 9.0])
+    if size > 2:
+        u = rng.uniform(0.1, 0.9)
+        factors = np.array([perm(j, 2) * u ** max(j - 2, 0) for j in range(size)])
+        there = factors @ piece + [0.0, 0.0, GRAVITY]
+        piece[2] -= there / 2 * (1.0 - 10.0 ** rng.uniform(-15.0, -1.0))
+    return piece
+
+
+def vertical_motion(rng, size):
+    """Up and down, exactly or all but: the thrust direction does not turn."""
+    piece = rng.normal(size=(size, 3)) * [1.0, 1.0, 3.0]
+    piece[:, :2] *= rng.choice([0.0, 1e-12, 1e-6])
+    return piece
+
+
 def real_flight(rng, size):
     """A piece of a minimum-jerk spline of moderate size."""
     states = rng.normal(size=(6, 3)) * np.array([1, 3, 9, 1, 3, 9])[:, None]
@@ -120,8 +139,10 @@ def real_flight(rng, size):
 
 SHAPES = (
     random_piece, one_axis, noisy_line, uneven, equal_peaks, flat_peak, low_degree,
-    near_free_fall, real_flight,
+    near_free_fall, free_fall_within, vertical_motion, real_flight,
 )  # fmt: skip
+IN_METRES = (near_free_fall, free_fall_within)
+"""Shapes that are about gravity: for h = 1, not to be scaled."""  # fmt: skip
 
 
 def nasty_pieces(shape, count, seed):
@@ -131,9 +152,9 @@ def nasty_pieces(shape, count, seed):
         size = int(rng.integers(2, 13))
         piece = shape(rng, size)
         duration = 10.0 ** rng.uniform(-4.0, 4.0)
-        if shape is near_free_fall:
+        if shape in IN_METRES:
             duration = 1.0
-        if index % 2 and shape is not near_free_fall:
+        if index % 2 and shape not in IN_METRES:
             piece = piece * 10.0 ** rng.uniform(-60.0, 60.0)
         yield piece * duration ** -np.arange(float(size))[:, None], duration, rng
 
@@ -243,7 +264,7 @@ def is_below(truth, kappa, limit):
         return float(bound * limit) < truth.angle * (1.0 - 4e-16)
     if truth.kind == "least_thrust_acceleration":
         return bound**2 * truth.square < limit**2 and kappa < CAP
-    return bound**2 * limit**2 < truth.square
+    return bound**2 * limit**2 < truth.square and not (truth.kind in TURNS and kappa == CAP)
 
 
 def is_far_above(truth, kappa, limit):
@@ -257,6 +278,102 @@ def is_far_above(truth, kappa, limit):
     return bound**2 * limit**2 > wide**2 * truth.square + rounding
 
 
+class TurnTruth:
+    """As `Truth`, for how fast the thrust direction turns."""
+
+    def __init__(self, kind, coefficients, duration, also=0.0):
+        self.kind, self.duration, self.also = kind, duration, float(also)
+        self.rows = [  # of acceleration with gravity, jerk, snap
+            [
+                [perm(j, order) * Fraction(float(x)) for x in coefficients[j]]
+                for j in range(order, len(coefficients))
+            ] or [[Fraction(0)] * 3]
+            for order in (2, 3, 4)
+        ]  # fmt: skip
+        self.rows[0][0][2] += Fraction(GRAVITY)
+        terms = [[[x * Fraction(duration) ** j for x in row] for j, row in enumerate(rows)]
+                 for rows in self.rows]  # fmt: skip
+        self.sizes = [max(sum(abs(row[d]) for row in rows) for d in range(3)) for rows in terms]
+        thrust = self.sizes[0] or Fraction(1)
+        pace = Fraction(max(self.sizes[1] / thrust, math.sqrt(self.sizes[2] / thrust)) or 1)
+        columns = [  # in units of thrust and time in which all are about 1
+            np.array([[float(x / (thrust * pace**order)) for x in row] for row in rows])
+            for order, rows in enumerate(terms)
+        ]
+        points, width = np.linspace(0.0, 1.0, 257), 1.0 / 256
+        for _ in range(4):
+            f, j, s = (np.polynomial.polynomial.polyval(points, c) for c in columns)
+            with np.errstate(all="ignore"):
+                top, bottom = self._parts(f, j, s)
+                best = float(points[np.argmax(np.nan_to_num(top / bottom, nan=0.0, posinf=0.0))])
+            points = np.linspace(max(best - width, 0.0), min(best + width, 1.0), 65)
+            width /= 30.0
+        self.points = [best, 0.0, 1.0, self.also]
+
+    def _parts(self, f, j, s):
+        """Numerator and denominator of the square of the value, from derivatives of F / |F|."""
+        length, along, turn = dot(f, f), dot(f, j), cross(f, j)
+        if self.kind == "body_rate":
+            return dot(turn, turn), length**2
+        turn = [length * x - 2 * along * y for x, y in zip(cross(f, s), turn, strict=True)]
+        return dot(turn, turn), length**4
+
+    @cached_property
+    def exact(self):
+        """Thrust, numerator and denominator at the points."""
+        found = []
+        for u in self.points:
+            t = Fraction(u) * Fraction(self.duration)
+            motion = []
+            for rows in self.rows:
+                values = [Fraction(0)] * 3
+                for row in reversed(rows):
+                    values = [value * t + x for value, x in zip(values, row, strict=True)]
+                motion.append(values)
+            found.append((dot(motion[0], motion[0]), *self._parts(*motion)))
+        return found
+
+    @cached_property
+    def square(self):
+        """Square of the largest value that was found, exactly; without bound in free fall."""
+        if any(bottom == 0 for _, _, bottom in self.exact):
+            return Fraction(10) ** 40
+        return max(top / bottom for _, top, bottom in self.exact)
+
+    def kappa(self, values, limit):
+        """Value over limit of one sample, in floats."""
+        return math.sqrt(values[1] / values[2]) / limit
+
+    @cached_property
+    def cancels(self):
+        """Whether thrust all but vanishes somewhere, or terms of the numerator all but cancel."""
+        thrust, jerk, snap = self.sizes
+        thrust += Fraction(2 * GRAVITY)  # which may have cancelled
+        for length, top, bottom in self.exact:
+            if length < (thrust / 30) ** 2:
+                return True
+            if bottom and top / bottom == self.square:
+                whole = length * jerk**2
+                if self.kind == "angular_acceleration":
+                    whole = length**2 * (length * snap**2 + jerk**4)
+                if top * 900 < whole:
+                    return True
+        return False
+
+
+def dot(one, other):
+    return sum(x * y for x, y in zip(one, other, strict=True))
+
+
+def cross(one, other):
+    (a, b, c), (x, y, z) = one, other
+    return [b * z - c * y, c * x - a * z, a * y - b * x]
+
+
+def truth_of(kind, *arguments, **options):
+    return (TurnTruth if kind in TURNS else Truth)(kind, *arguments, **options)
+
+
 # ---- bounds against the truth ---------------------------------------------------------------
 
 
@@ -264,7 +381,7 @@ def check_pieces(shape, count, seed):
     """Returns on how many pieces times kinds the bound was shown to be close."""
     close = 0
     for coefficients, duration, rng in nasty_pieces(shape, count, seed):
-        truths = [Truth(kind, coefficients, duration) for kind in NAMES]
+        truths = [truth_of(kind, coefficients, duration) for kind in NAMES]
         peaks = [t.angle if t.kind == "tilt" else math.sqrt(t.square) for t in truths]
         limits = [(peak or 1.0) * 10.0 ** rng.uniform(-1.0, 1.0) for peak in peaks]
         upper, lower, place = kernel_bounds(coefficients[None], [duration], limits)
@@ -273,7 +390,7 @@ def check_pieces(shape, count, seed):
         assert ((place >= 0.0) & (place <= 1.0)).all()
         for index, (kind, limit) in enumerate(zip(NAMES, limits, strict=True)):
             # roots of nasty polynomials are rough: look where the kernel says, too
-            truth = Truth(kind, coefficients, duration, also=place[0, index])
+            truth = truth_of(kind, coefficients, duration, also=place[0, index])
             where = f"{kind} of {coefficients.tolist()} in {duration} s"
             assert not is_below(truth, upper[0, index], limit), where
             if not (kind in QUOTIENTS and truth.cancels):
@@ -287,9 +404,9 @@ def check_pieces(shape, count, seed):
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_bounds_hold_in_exact_arithmetic_and_are_close(shape):
-    count = 225  # times nine shapes and six kinds
+    count = 180  # times eleven shapes and eight kinds
     close = check_pieces(shape, count, seed=1)
-    print("CLOSE", shape, close / (6 * count))
+    print("CLOSE", shape, close / (8 * count))
     assert close > 2 * count
 
 
@@ -301,11 +418,11 @@ def test_bounds_of_a_few_pieces(shape):
 
 def test_kinds_that_are_not_limited_are_not_judged():
     piece = np.random.default_rng(0).normal(size=(1, 6, 3))
-    limits = [1.0, math.nan, math.nan, 2.0, math.nan, math.nan]
-    upper, lower, _ = kernel_bounds(piece, [1.0], limits)
-    expected = [kind.name in ("speed", "snap") for kind in KINDS]
-    np.testing.assert_array_equal(np.isfinite(upper[0]), expected)
-    np.testing.assert_array_equal(np.isfinite(lower[0]), expected)
+    for chosen in (("speed", "snap"), ("snap", "body_rate"), ("angular_acceleration",)):
+        expected = [kind.name in chosen for kind in KINDS]
+        upper, lower, _ = kernel_bounds(piece, [1.0], np.where(expected, 2.0, math.nan))
+        np.testing.assert_array_equal(np.isfinite(upper[0]), expected)
+        np.testing.assert_array_equal(np.isfinite(lower[0]), expected)
 
 
 @kernels
@@ -313,10 +430,11 @@ def test_kinds_that_are_not_limited_are_not_judged():
 def test_derivatives_that_vanish_have_kappa_zero(size):
     """Degrees 0 to 3: no snap, no jerk, no acceleration beside gravity, no motion."""
     piece = np.ones((1, size, 3))
-    upper, lower, _ = kernel_bounds(piece, [2.0], [1.0, 20.0, 1.0, 1.0, 0.5, 2.0])
-    for kind in ("speed", "jerk", "snap"):
+    upper, lower, _ = kernel_bounds(piece, [2.0], [1.0, 20.0, 1.0, 1.0, 0.5, 2.0, 1.0, 1.0])
+    for kind in ("speed", "jerk", "snap", *TURNS):
         index = NAMES.index(kind)
-        assert (upper[0, index] == lower[0, index] == 0.0) == (ORDERS[kind] >= size)
+        least = 3 if kind in TURNS else ORDERS[kind]  # without jerk nothing turns
+        assert (upper[0, index] == lower[0, index] == 0.0) == (least >= size)
     if size <= 2:
         hover = [GRAVITY / 20.0, 0.0, 2.0 / GRAVITY]
         names = ("thrust_acceleration", "tilt", "least_thrust_acceleration")
@@ -340,9 +458,11 @@ def test_bounds_do_not_grow_when_a_piece_is_cut():
 
 def test_free_fall_has_no_least_thrust_and_no_tilt():
     falling = Trajectory([[[0, 0, 9], [1, 0, 0], [0, 0, -GRAVITY / 2]]], [1.0])
-    limits = Limits(least_thrust_acceleration=1.0, tilt=0.5)
+    limits = Limits(least_thrust_acceleration=1.0, tilt=0.5, body_rate=1.0,
+                    angular_acceleration=1.0)  # fmt: skip
     report = certify(falling, limits)
     assert not report.feasible
+    assert all(report.peaks[name][0] == CAP for name in TURNS)
     assert report.peaks["least_thrust_acceleration"][0] == CAP
     assert report.peaks["tilt"][0] == pytest.approx(math.pi / 0.5)
     upside_down = Trajectory([[[0, 0, 9], [1, 0, 0], [1, 0, -GRAVITY]]], [1.0])
@@ -368,7 +488,8 @@ def test_kappa_is_what_samples_show(seed):
     """With the definitions written out once more: Eq. kapp_i and Eq. kappa2 (Remark 1)."""
     trajectory = wavy(seed, stretch=1.3)
     limits = Limits(speed=3.0, thrust_acceleration=15.0, jerk=30.0, snap=300.0, tilt=0.7,
-                    least_thrust_acceleration=5.0)  # fmt: skip
+                    least_thrust_acceleration=5.0, body_rate=6.0,
+                    angular_acceleration=50.0)  # fmt: skip
     peaks = certify(trajectory, limits).peaks
     v, a, j, s = (trajectory.sample(20_001, order) for order in range(1, 5))
     f = a + np.array([0.0, 0.0, 9.81])
@@ -381,10 +502,18 @@ def test_kappa_is_what_samples_show(seed):
         "tilt": np.arccos(np.clip(f[..., 2] / thrust, -1, 1)).max(axis=1) / 0.7,
         "least_thrust_acceleration": 5.0 / thrust.min(axis=1),
     }
+    n = f / thrust[..., None]  # the thrust direction and its derivatives, as quotients
+    first = (n * j).sum(axis=-1)
+    rate = (j - n * first[..., None]) / thrust[..., None]
+    second = (rate * j + n * s).sum(axis=-1)
+    change = (s - 2 * rate * first[..., None] - n * second[..., None]) / thrust[..., None]
+    by_hand["body_rate"] = np.linalg.norm(rate, axis=-1).max(axis=1) / 6.0
+    turn = np.linalg.norm(np.cross(n, change), axis=-1)
+    by_hand["angular_acceleration"] = turn.max(axis=1) / 50.0
     for name, expected in by_hand.items():
         # samples every 0.1 ms miss a smooth peak by the square of that
         np.testing.assert_allclose(peaks[name], expected, rtol=1e-6)
-        assert (peaks[name] >= expected * (1.0 - 1e-15)).all()
+        assert (peaks[name] >= expected * (1.0 - 1e-14)).all()
 
 
 def test_gravity_makes_climbing_harder_than_diving():
@@ -399,15 +528,36 @@ def test_gravity_makes_climbing_harder_than_diving():
 
 ALL = {
     "speed": 5.0, "thrust_acceleration": 15.5, "jerk": 62.0, "snap": 800.0, "tilt": 0.6,
-    "least_thrust_acceleration": 6.0,
+    "least_thrust_acceleration": 6.0, "body_rate": 4.0, "angular_acceleration": 20.0,
 }  # fmt: skip
 LIMIT_SETS = [{name: value} for name, value in ALL.items()] + [
     {name: ALL[name] for name in NAMES[:4]},
     ALL,
 ]
 every_set = pytest.mark.parametrize(
-    "values", LIMIT_SETS, ids=lambda v: "+".join(v) if len(v) < 6 else "all"
+    "values", LIMIT_SETS, ids=lambda v: "+".join(v) if len(v) < 8 else "all"
 )
+
+
+def turning_stretch(name, limit, motion):
+    """(n,) stretches from which on samples keep a limit, by bisection of their logarithm.
+
+    From a stretch on at which all do, down to the first at which one does not.
+    """
+
+    def worst(stretch):
+        return limited_values([d / stretch**k for k, d in enumerate(motion, start=1)])[name].max()
+
+    high = 1.0
+    while worst(high) > limit:
+        high *= 1.5
+    low = high
+    while worst(low) <= limit:
+        low, high = low / 1.1, low
+    for _ in range(30):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if worst(middle) <= limit else (middle, high)
+    return np.array([high])
 
 
 def required_stretch(trajectory, values, count=4001):
@@ -432,6 +582,8 @@ def required_stretch(trajectory, values, count=4001):
             (np.hypot(a[:, 0], a[:, 1]) / np.tan(x) - vertical).clip(0.0) / GRAVITY
         ),
         "least_thrust_acceleration": lambda x: larger_root(x, -1.0),
+        "body_rate": lambda x: turning_stretch("body_rate", x, (v, a, j, s)),
+        "angular_acceleration": lambda x: turning_stretch("angular_acceleration", x, (v, a, j, s)),
     }
     return max(asked[name](value).max() for name, value in values.items())
 
@@ -462,8 +614,9 @@ def test_stretch_is_exact_from_anywhere(values, too_slow, minimize, path):
     np.testing.assert_allclose(stretched, terms, rtol=1e-14, atol=1e-14 * np.abs(terms).max())
     if values == {"least_thrust_acceleration": 6.0} and (path is wavy or too_slow < 0.3):
         return  # a path that does not dive, or is flown so fast that thrust never vanishes
-    # the stretch is closed to 1e-9; where little thrust is left, tilt changes faster than that
-    assert 1.0 - (1e-8 if "tilt" in values else 2e-9) <= report.worst <= 1.0
+    # the stretch is closed to 1e-9; where little thrust is left, its direction changes faster
+    on_direction = {"tilt", *TURNS} & set(values)
+    assert 1.0 - (1e-8 if on_direction else 2e-9) <= report.worst <= 1.0
     # samples miss the worst point by the square of their distance
     assert factor == pytest.approx(required_stretch(given, values), rel=1e-6)
 

@@ -362,6 +362,7 @@ def test_courses_that_are_no_files(run: Run, folder: Path) -> None:
         ("tilt=50", "write 50deg for degrees"),
         ("tilt=90deg", "must be below pi/2"),
         ("tilt=steep", "in rad, or degrees such as 50deg"),
+        ("body_rate=400deg", "'400deg'; it must be a number, in rad/s"),
         ("velocity=5", "unknown limit 'velocity'; known are speed,"),
         ("speed=5,speed=6", "limit speed is given twice"),
         ("speed", "'speed' is not a limit"),
@@ -389,6 +390,9 @@ def test_limits_round_trip() -> None:
     )
     assert parse_limits(written(limits)) == limits
     assert parse_limits("tilt=0.5").tilt == 0.5
+    turning = parse_limits("body_rate=8,angular_acceleration=80")
+    assert turning == pf.Limits(body_rate=8.0, angular_acceleration=80.0)
+    assert written(turning) == "body_rate=8,angular_acceleration=80"
 
 
 @pytest.mark.parametrize(

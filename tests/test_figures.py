@@ -37,6 +37,10 @@ from peakflight.figures.canvas import COLOURS, FAINT, LIMIT, even_step, seconds
 from peakflight.figures.view import View
 
 LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+ALL_LIMITS = Limits(
+    **LIMITS.to_dict(), tilt=0.8, least_thrust_acceleration=4.0, body_rate=4.0,
+    angular_acceleration=30.0,
+)  # fmt: skip
 FIGURES = (course_figure, derivatives_figure, segment_times_figure)
 TWISTY = np.array(
     [
@@ -95,6 +99,18 @@ def norms(trajectory, count=400):
         "snap": np.sqrt((fourth**2).sum(axis=-1)),
         "tilt": np.arccos(thrust[..., 2] / size),
         "least_thrust_acceleration": size,
+        **turning(thrust, third, fourth),
+    }
+
+
+def turning(thrust, jerk, snap):
+    """From the formula with powers of the thrust."""
+    square, along = (thrust * thrust).sum(axis=-1), (thrust * jerk).sum(axis=-1)
+    turn = np.cross(thrust, jerk)
+    change = square[..., None] * np.cross(thrust, snap) - 2.0 * along[..., None] * turn
+    return {
+        "body_rate": np.sqrt((turn**2).sum(axis=-1)) / square,
+        "angular_acceleration": np.sqrt((change**2).sum(axis=-1)) / square**2,
     }
 
 
@@ -224,7 +240,7 @@ CASES = {
     "loose limits": lambda: make_plan(TWISTY, limits=Limits(speed=500.0, snap=1e6)),
     "all limits": lambda: make_plan(
         TWISTY,
-        limits=Limits(**LIMITS.to_dict(), tilt=0.8, least_thrust_acceleration=4.0),
+        limits=ALL_LIMITS,
     ),
 }
 
@@ -373,11 +389,10 @@ def test_view_from_side_casts_its_shadow_under_the_path():
 
 
 def test_derivatives_are_the_norms_and_limits_are_where_they_belong():
-    limits = Limits(**LIMITS.to_dict(), tilt=0.8, least_thrust_acceleration=4.0)
-    plan = make_plan(TWISTY, limits=limits)
+    plan = make_plan(TWISTY, limits=ALL_LIMITS)
     panels = derivatives_figure(plan).axes[::-1]
-    names = [*LIMITS.to_dict(), "tilt", "least_thrust_acceleration"]
-    heights = [5.0, 15.5, 62.0, 800.0, math.degrees(0.8), 4.0]
+    names = list(ALL_LIMITS.to_dict())
+    heights = [5.0, 15.5, 62.0, 800.0, math.degrees(0.8), 4.0, 4.0, 30.0]
     labels = [
         "speed\n(m/s)",
         "thrust\nacceleration\n(m/s²)",
@@ -385,6 +400,8 @@ def test_derivatives_are_the_norms_and_limits_are_where_they_belong():
         "snap\n(m/s⁴)",
         "tilt\n(°)",
         "least thrust\nacceleration\n(m/s²)",
+        "body rate\n(rad/s)",
+        "angular\nacceleration\n(rad/s²)",
     ]
     assert [panel.get_ylabel() for panel in panels] == labels
     for panel, name, height in zip(panels, names, heights, strict=True):
@@ -398,6 +415,15 @@ def test_derivatives_are_the_norms_and_limits_are_where_they_belong():
         assert panel.get_ylim()[0] == 0.0
         assert panel.get_ylim()[1] > y.max()
     assert panels[-1].get_xlabel() == "time (s)"
+
+
+def test_derivatives_in_free_fall_are_drawn():
+    falling = Trajectory([[[0, 0, 9], [1, 0, 0], [0, 0, -GRAVITY / 2]]], [1.0])
+    limits = Limits(speed=20.0, body_rate=4.0, angular_acceleration=30.0)
+    points = [[0, 0, 9], [1, 0, 9 - GRAVITY / 2]]
+    plan = make_plan(points, limits=limits, feasible=False, trajectory=falling)
+    for panel in derivatives_figure(plan).axes:
+        assert np.isfinite(panel.get_ylim()).all()
 
 
 def test_derivatives_without_a_limit_are_drawn_without_a_line():

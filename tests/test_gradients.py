@@ -70,8 +70,12 @@ def call_watch(
 
 
 @kernel
-def call_measure(kind, samples, squares, count, row, limit, gravity, values):
-    measures.measure(kind, samples, squares, count, row, limit, gravity, values)
+def call_measure(kind, samples, squares, count, row, limit, gravity, values, pulls):
+    measures.measure(kind, samples, squares, count, row, limit, gravity, values, pulls)
+
+
+def is_turning(limits):
+    return bool(np.isfinite(limits[measures.TURNING :]).any())
 
 
 def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watched=None):
@@ -83,7 +87,7 @@ def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watche
     value = call_evaluate(
         task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
         basis.sample_tables(degree, samples), watched, doublings, reference,
-        barrier.workspace(count, degree), gradient,
+        barrier.workspace(count, degree, is_turning(limits)), gradient,
     )  # fmt: skip
     return value, gradient
 
@@ -93,22 +97,22 @@ def watched_by(task, times, limits, *, doublings):
     watched = np.zeros((count, len(KINDS)), dtype=np.bool_)
     call_watch(
         task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
-        basis.sample_tables(degree, barrier.BATCH), doublings, barrier.workspace(count, degree),
-        watched,
+        basis.sample_tables(degree, barrier.BATCH), doublings,
+        barrier.workspace(count, degree, is_turning(limits)), watched,
     )  # fmt: skip
     return watched
 
 
-def measure(name, derivative, limit):
-    """(S,) m of S samples of the derivative (S, 3) that a kind is about."""
+def measure(name, derivatives, limit):
+    """(S,) m of S samples of the derivatives 1 to 4 (4, S, 3)."""
     kind = NAMES.index(name)
-    row = KINDS[kind].order - 1
-    samples = np.zeros((3, 4, len(derivative)))
-    samples[:, row] = derivative.T
-    values = np.empty(len(derivative))
+    samples = np.ascontiguousarray(np.moveaxis(derivatives, 2, 0))
+    count = samples.shape[2]
+    values = np.empty(count)
     call_measure(
-        kind, samples, (samples**2).sum(axis=0), len(derivative), row, limit, GRAVITY, values
-    )
+        kind, samples, (samples**2).sum(axis=0), count, KINDS[kind].order - 1, limit, GRAVITY,
+        values, np.zeros(samples.shape) if kind >= measures.TURNING else None,
+    )  # fmt: skip
     return values
 
 
@@ -236,18 +240,30 @@ def test_adjoints_of_both_kernels_agree(monkeypatch):
 # ---- measures: what the optimiser takes for a limit -----------------------------------------
 
 
-def keeps(name, derivative, limit):
-    """(S,) whether samples keep a limit, and by how much they do not, from its definition."""
-    thrust = derivative + np.array([0.0, 0.0, GRAVITY])
+def keeps(name, derivatives, limit):
+    """(S,) by how much samples (4, S, 3) exceed a limit, from its definition."""
+    _, a, j, s = derivatives
+    thrust = a + np.array([0.0, 0.0, GRAVITY])
+    size = np.linalg.norm(thrust, axis=1)
     if name == "thrust_acceleration":
-        return np.linalg.norm(thrust, axis=1) / limit
+        return size / limit
     if name == "least_thrust_acceleration":
-        return limit / np.linalg.norm(thrust, axis=1)
+        return limit / size
     if name == "tilt":
         return np.arctan2(np.linalg.norm(thrust[:, :2], axis=1), thrust[:, 2]) / limit
-    return np.linalg.norm(derivative, axis=1) / limit
+    if name in TURNS:  # derivatives of the unit vector n = F / |F|
+        size, n = size[:, None], thrust / size[:, None]
+        grows = (n * j).sum(axis=1, keepdims=True)
+        rate = (j - n * grows) / size
+        if name == "body_rate":
+            return np.linalg.norm(rate, axis=1) / limit
+        grows_more = (rate * j + n * s).sum(axis=1, keepdims=True)
+        second = (s - 2.0 * rate * grows - n * grows_more) / size
+        return np.linalg.norm(np.cross(n, second), axis=1) / limit
+    return np.linalg.norm(derivatives[KINDS[NAMES.index(name)].order - 1], axis=1) / limit
 
 
+TURNS = ("body_rate", "angular_acceleration")
 LIMITS = {
     "speed": 5.0,
     "thrust_acceleration": 15.5,
@@ -255,46 +271,77 @@ LIMITS = {
     "snap": 800.0,
     "tilt": 0.8,
     "least_thrust_acceleration": 4.0,
+    "body_rate": 8.0,
+    "angular_acceleration": 80.0,
 }
+
+
+def motions(rng, count):
+    """(4, S, 3) derivatives 1 to 4 of the sizes that they have in flight."""
+    return rng.normal(size=(4, count, 3)) * np.array([5.0, 9.0, 60.0, 800.0])[:, None, None]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_measure_is_at_most_one_exactly_where_the_limit_is_kept(name):
-    rng = np.random.default_rng(0)
-    scale = {"speed": 5.0, "jerk": 60.0, "snap": 800.0}.get(name, 9.0)
-    derivative = rng.normal(size=(5000, 3)) * scale
+    derivatives = motions(np.random.default_rng(0), 5000)
     if name == "least_thrust_acceleration":
-        derivative[:, 2] -= GRAVITY  # around free fall
-        derivative[:, :2] *= 0.3
-    ratio = keeps(name, derivative, LIMITS[name])
-    values = measure(name, derivative, LIMITS[name])
+        derivatives[1, :, 2] -= GRAVITY  # around free fall
+        derivatives[1, :, :2] *= 0.3
+    ratio = keeps(name, derivatives, LIMITS[name])
+    values = measure(name, derivatives, LIMITS[name])
     assert np.isfinite(values).all()
     assert (values >= 0.0).all()
-    # tilt is smoothed by SOFTNESS, which moves its border by a part of 2.5e-7 of gravity
-    clear = np.abs(ratio - 1.0) > (1e-5 if name == "tilt" else 1e-12)
+    # tilt is smoothed by SOFTNESS, which moves its border by a part of 2.5e-7 of gravity; GUARD
+    # moves what turning is by the square of GUARD g over the thrust, where the thrust is small
+    clear = np.abs(ratio - 1.0) > (1e-5 if name in ("tilt", *TURNS) else 1e-12)
+    if name in TURNS:
+        clear &= np.linalg.norm(derivatives[1] + [0.0, 0.0, GRAVITY], axis=1) > 4.0
     np.testing.assert_array_equal(values[clear] <= 1.0, ratio[clear] <= 1.0)
     assert 500 < (ratio <= 1.0).sum() < 4500
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("least")])
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if not (name.startswith("least") or name in TURNS)]
+)
 def test_root_of_a_measure_is_the_uniform_stretch_that_is_needed(name):
     rng = np.random.default_rng(1)
     kind = NAMES.index(name)
-    derivative = rng.normal(size=(1000, 3)) * LIMITS[name] * (10.0 if name == "tilt" else 1.0)
-    stretch = measure(name, derivative, LIMITS[name]) ** (1.0 / measures.EXPONENTS[kind])
+    derivatives = rng.normal(size=(4, 1000, 3)) * LIMITS[name] * (10.0 if name == "tilt" else 1.0)
+    stretch = measure(name, derivatives, LIMITS[name]) ** (1.0 / measures.EXPONENTS[kind])
     real = stretch > (0.1 if name == "tilt" else 0.0)  # below, smoothing bends it
-    slowed = derivative[real] / stretch[real, None] ** KINDS[kind].order
+    slowed = derivatives[:, real] / stretch[real, None] ** KINDS[kind].order
     ratio = keeps(name, slowed, LIMITS[name])
     # (SOFTNESS / stretch^2)^2 is the relative error that smoothing leaves
     np.testing.assert_allclose(ratio, 1.0, rtol=0, atol=1e-2 if name == "tilt" else 1e-10)
     assert real.sum() > 400
 
 
+@pytest.mark.parametrize("name", TURNS)
+def test_root_of_turning_is_the_stretch_once_gravity_dominates(name):
+    derivatives = motions(np.random.default_rng(1), 1000) * 1e-4
+    values = measure(name, derivatives, LIMITS[name])
+    stretch = values ** (1.0 / measures.EXPONENTS[NAMES.index(name)])
+    slowed = np.array([d / stretch[:, None] ** s for s, d in enumerate(derivatives, start=1)])
+    ratio = keeps(name, slowed, LIMITS[name])
+    assert (stretch < 0.3).all()
+    # acceleration / stretch^2 is not small against gravity for all of them
+    np.testing.assert_allclose(np.median(ratio), 1.0, rtol=0, atol=0.05)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_measures_at_rest_are_finite_and_within_the_limit(name):
-    values = measure(name, np.zeros((3, 3)), LIMITS[name])
+    values = measure(name, np.zeros((4, 3, 3)), LIMITS[name])
     assert (values >= 0.0).all()
     assert (values < 1.0).all()
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_turning_in_free_fall_is_finite_and_far_too_fast(name):
+    derivatives = motions(np.random.default_rng(2), 100)
+    derivatives[1] = [0.0, 0.0, -GRAVITY]
+    values = measure(name, derivatives, LIMITS[name])
+    assert np.isfinite(values).all()
+    assert (values > 1e3).all()
 
 
 # ---- the barrier function -------------------------------------------------------------------
@@ -307,16 +354,17 @@ def sampled(task, times, samples):
 
 
 def limits_for(names, derivatives, stretch):
-    """(kinds,) limits that the worst sample needs this uniform stretch to keep."""
+    """(kinds,) limits at which the largest m^(1/e) of all samples is `stretch`."""
     limits = np.full(len(KINDS), NAN)
     for index, kind in enumerate(KINDS):
         if kind.name not in names:
             continue
-        slowed = derivatives[kind.order - 1] / stretch**kind.order
-        if kind.name == "least_thrust_acceleration":  # its measure is not a stretch but a ratio
-            slowed = derivatives[1]
+        slowed = derivatives / stretch**kind.order
+        ratio = 1.0
+        if kind.name.startswith("least") or kind.name in TURNS:  # m is a ratio squared
+            slowed, ratio = derivatives, stretch ** (measures.EXPONENTS[index] / 2)
         unit = np.nanmax(keeps(kind.name, slowed, 1.0))
-        limits[index] = stretch / unit if kind.name.startswith("least") else unit
+        limits[index] = ratio / unit if kind.name.startswith("least") else unit / ratio
     return limits
 
 
@@ -329,7 +377,7 @@ def slow_barrier(task, times, limits, *, doublings, samples, reference):
         if np.isnan(limits[index]):
             continue
         exponent = measures.EXPONENTS[index]
-        m = measure(kind.name, derivatives[kind.order - 1], limits[index])
+        m = measure(kind.name, derivatives, limits[index])
         with np.errstate(divide="ignore"):
             x = power / exponent * np.log(m)
         excess = np.maximum(x - barrier.CAP, 0.0)

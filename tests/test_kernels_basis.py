@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from peakflight.kernels import basis, bounds, layout
+from peakflight.kernels import basis, bernstein, layout
 from peakflight.problem import DEGREES
 
 pytestmark = pytest.mark.kernels
@@ -169,9 +169,9 @@ def test_full_end_data_fold_into_those_with_the_start_last(degree):
 
 @every_degree
 def test_bernstein_tables_convert_and_multiply(degree):
-    convert, product = bounds.bernstein_tables(degree)
+    convert, product = bernstein.bernstein_tables(degree)
 
-    def bernstein(n, i):
+    def basis_function(n, i):
         return [
             Fraction((-1) ** (j - i) * comb(n, j) * comb(j, i)) if j >= i else Fraction(0)
             for j in range(n + 1)
@@ -180,7 +180,7 @@ def test_bernstein_tables_convert_and_multiply(degree):
     for n in range(degree + 1):
         for power in range(n + 1):  # u^power from control points convert[n, :, power]
             points = [Fraction(float(x)).limit_denominator(10**6) for x in convert[n, :, power]]
-            columns = [bernstein(n, i) for i in range(n + 1)]
+            columns = [basis_function(n, i) for i in range(n + 1)]
             total = [sum(p * c[j] for p, c in zip(points, columns, strict=False))
                      for j in range(n + 1)]  # fmt: skip
             assert total == [Fraction(j == power) for j in range(n + 1)]
@@ -196,7 +196,7 @@ def test_bernstein_tables_convert_and_multiply(degree):
 
 @every_degree
 def test_falling_factorials_are_the_factors_of_derivatives(degree):
-    table = bounds.falling_factorials(degree)
+    table = bernstein.falling_factorials(degree)
     assert table.shape == (max(degree, 4) + 1, degree + 1)
     for power in range(degree + 1):
         monomial = Polynomial([0] * power + [1])
@@ -205,4 +205,4 @@ def test_falling_factorials_are_the_factors_of_derivatives(degree):
 
 
 def test_falling_factorials_reach_snap_at_low_degrees():
-    np.testing.assert_array_equal(bounds.falling_factorials(1), [[1, 1], [0, 1]] + [[0, 0]] * 3)
+    np.testing.assert_array_equal(bernstein.falling_factorials(1), [[1, 1], [0, 1]] + [[0, 0]] * 3)

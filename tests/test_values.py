@@ -93,7 +93,7 @@ def test_limits_are_frozen_floats_in_the_order_of_kinds():
     assert_frozen(limits)
     assert (type(limits.snap), type(limits.speed)) == (float, float)
     assert [kind.name for kind in limits.active] == ["speed", "snap", "tilt"]
-    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, NAN])
+    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, NAN, NAN, NAN])
     assert limits.to_dict() == {"speed": 5.0, "snap": 800.0, "tilt": 0.5}
     assert limits == Limits(speed=5.0, snap=800.0, tilt=0.5)
     assert [field.name for field in dataclasses.fields(Limits)] == [kind.name for kind in KINDS]
@@ -132,11 +132,37 @@ def test_limited_values_of_a_known_motion():
     assert values["tilt"] == pytest.approx(math.pi / 4)
     assert values["jerk"] == 2.0
     np.testing.assert_array_equal(values["snap"], [3.0, 0.0])
+    # F = g (1, 0, 1), j = (0, 0, -2): F x j = (0, 2 g, 0), r = -1 / g, s - 2 r j = s - 4 / g e3
+    assert values["body_rate"] == pytest.approx(1.0 / GRAVITY)
+    x, y, z = 1.0, 2.0, 2.0 - 4.0 / GRAVITY
+    first = np.linalg.norm([-y, x - z, y]) / (2.0 * GRAVITY)
+    np.testing.assert_allclose(values["angular_acceleration"], [first, 2.0 / GRAVITY**2])
     assert set(values) == {kind.name for kind in KINDS}
     assert set(limited_values([velocity])) == {"speed"}
     assert "jerk" not in limited_values([velocity, acceleration])
     upside_down = limited_values([velocity, np.array([0.0, 0.0, -2 * GRAVITY])])
     assert upside_down["tilt"] == pytest.approx(math.pi)
+    falling = limited_values([velocity, np.array([0.0, 0.0, -GRAVITY]), jerk, snap[0]])
+    assert falling["body_rate"] == falling["angular_acceleration"] == math.inf
+
+
+def test_turning_is_the_motion_of_the_thrust_direction():
+    """A thrust that turns in a plane, alone and while it grows."""
+    t, rate, change, growth = 0.3, 1.7, 2.3, 0.6
+    angle = rate * t + 0.5 * change * t**2
+    speed = rate + change * t
+    n, across = (
+        np.array([np.cos(angle), 0, np.sin(angle)]),
+        np.array([-np.sin(angle), 0, np.cos(angle)]),
+    )
+    for level in (GRAVITY, 0.5):
+        size = level * (1.0 + growth * t)
+        thrust = size * n
+        jerk = level * growth * n + size * speed * across
+        snap = 2 * level * growth * speed * across + size * (change * across - speed**2 * n)
+        values = limited_values([np.zeros(3), thrust - [0.0, 0.0, GRAVITY], jerk, snap])
+        assert values["body_rate"] == pytest.approx(speed)
+        assert values["angular_acceleration"] == pytest.approx(change)
 
 
 def test_keeps_is_from_above_and_for_least_thrust_from_below():

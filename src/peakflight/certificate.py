@@ -5,12 +5,13 @@ the file (`kernels.bounds`).
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
-from peakflight.kernels import bounds, joints
+from peakflight.kernels import bernstein, bounds, joints, turning
 from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
@@ -69,8 +70,9 @@ def certify(
     smooth = 2 if continuity is None else continuity
     if smooth < 0:
         raise InvalidProblem(f"continuity is {smooth}; it must be 0 or more")
+    factorials = bernstein.falling_factorials(trajectory.degree)
     jump, joint, order, miss, waypoint = joints.residuals(
-        coefficients, times, smooth, bounds.falling_factorials(trajectory.degree), points, firsts,
+        coefficients, times, smooth, factorials, points, firsts,
         _jump_caps(limits, smooth), JOINT_TOLERANCE,
     )  # fmt: skip
     peaks = {
@@ -140,11 +142,9 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
     _check_axes(trajectory)
     coefficients = fresh(trajectory.coefficients)
     times = fresh(trajectory.segment_times)
-    shape = (len(times), len(KINDS))
     factor = bounds.stretch(
-        coefficients, times, limits.as_array(), GRAVITY, _tables(trajectory.degree), TOLERANCE,
-        np.empty(shape), np.empty(shape), np.empty(shape),
-    )  # fmt: skip
+        *_arguments(coefficients, times, limits, np.empty((len(times), len(KINDS))))
+    )
     if not (np.isfinite(factor) and times.min() >= SHORTEST and times.max() <= LONGEST):
         return None
     return Trajectory(coefficients, times, trajectory.start_time), float(factor)
@@ -157,12 +157,8 @@ def peak_ratios(trajectory: Trajectory, limits: Limits) -> np.ndarray:
 
 
 def _bound(coefficients: np.ndarray, times: np.ndarray, limits: Limits) -> np.ndarray:
-    shape = (len(times), len(KINDS))
-    upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
-    bounds.certify(
-        coefficients, times, limits.as_array(), GRAVITY, _tables(coefficients.shape[1] - 1),
-        TOLERANCE, upper, lower, place,
-    )  # fmt: skip
+    upper = np.empty((len(times), len(KINDS)))
+    bounds.certify(*_arguments(coefficients, times, limits, upper))
     return upper
 
 
@@ -175,6 +171,25 @@ def _firsts(pieces: Sequence[int], segments: int) -> np.ndarray:
             f"pieces must be whole numbers from 1 that add up to the {segments} segments"
         )
     return np.concatenate(([0], np.cumsum(counts)[:-1])).astype(np.int64)
+
+
+def _arguments(
+    coefficients: np.ndarray, times: np.ndarray, limits: Limits, upper: np.ndarray
+) -> tuple[Any, ...]:
+    """What the kernels of `bounds` take; upper (K, len(KINDS)) is where bounds will be."""
+    degree = coefficients.shape[1] - 1
+    return (
+        coefficients,
+        times,
+        limits.as_array(),
+        GRAVITY,
+        bounds.lookup_tables(degree),
+        TOLERANCE,
+        upper,
+        np.empty_like(upper),
+        np.empty_like(upper),
+        turning.workspace(degree) if limits.on_turning else None,
+    )
 
 
 def _state_error(
@@ -190,7 +205,7 @@ def _state_error(
     pieces = np.array(
         [len(times) - 1 if index == len(firsts) else firsts[index] for index in indices]
     )
-    factorials = bounds.falling_factorials(coefficients.shape[1] - 1)
+    factorials = bernstein.falling_factorials(coefficients.shape[1] - 1)
     error, where, order = joints.state_errors(
         coefficients, times, factorials, pieces, at_end, states
     )
@@ -209,10 +224,6 @@ def _jump_caps(limits: Limits, continuity: int) -> np.ndarray:
         if limit is not None and kind.order <= continuity:
             caps[kind.order] = JUMP_OF_LIMIT * limit
     return caps
-
-
-def _tables(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return (*bounds.bernstein_tables(degree), bounds.falling_factorials(degree))
 
 
 def _check_axes(trajectory: Trajectory) -> None:

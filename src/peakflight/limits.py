@@ -1,8 +1,9 @@
 """The kinds of limit that a trajectory can be held to, and the values of one vehicle.
 
 `Limits` is an open set: a kind is one entry of `KINDS`, one optional field of `Limits`, one unit
-in `kernels/measures.py` (what the optimisers see) and one in `kernels/bounds.py` (what the
-certificate proves). Everything else, from the report to the command line, goes through `KINDS`.
+in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joint` sees) and one in
+`kernels/bounds.py` (what the certificate proves). Everything else, from the report to the command
+line, goes through `KINDS`.
 """
 
 import math
@@ -37,6 +38,8 @@ KINDS = (
     LimitKind("snap", "m/s^4", 4, "snap"),
     LimitKind("tilt", "rad", 2, "tilt"),
     LimitKind("least_thrust_acceleration", "m/s^2", 2, "least thrust acceleration"),
+    LimitKind("body_rate", "rad/s", 3, "body rate"),
+    LimitKind("angular_acceleration", "rad/s^2", 4, "angular acceleration"),
 )
 """In the order in which kernels number them."""
 LABELS = {kind.name: kind.label for kind in KINDS}
@@ -71,6 +74,10 @@ class Limits:
     """Largest angle of a + g e3 from the vertical, rad, below pi/2."""
     least_thrust_acceleration: float | None = None
     """Smallest norm of a + g e3, m/s^2, below g."""
+    body_rate: float | None = None
+    """Largest angular speed of the direction of a + g e3, rad/s."""
+    angular_acceleration: float | None = None
+    """Largest angular acceleration of that direction, in a frame that does not twist, rad/s^2."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -99,6 +106,11 @@ class Limits:
     def active(self) -> tuple[LimitKind, ...]:
         """The kinds that are set, in the order of `KINDS`."""
         return tuple(kind for kind in KINDS if getattr(self, kind.name) is not None)
+
+    @property
+    def on_turning(self) -> bool:
+        """Whether how fast the thrust direction turns is limited: kernels of its own prove that."""
+        return self.body_rate is not None or self.angular_acceleration is not None
 
     def as_array(self) -> np.ndarray:
         """Values in the order of `KINDS`, shape (len(KINDS),); NaN where nothing is limited."""
@@ -145,12 +157,28 @@ def limited_values(derivatives: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
         values["least_thrust_acceleration"] = values["thrust_acceleration"]
         across = np.linalg.norm(thrust[..., :2], axis=-1)
         values["tilt"] = np.arctan2(across, thrust[..., 2])
+    if len(derivatives) >= 3:
+        values["body_rate"] = _turn(thrust, derivatives[2])
+    if len(derivatives) >= 4:
+        jerk = derivatives[2]
+        square = (thrust * thrust).sum(axis=-1, keepdims=True)
+        along = 2.0 * (thrust * jerk).sum(axis=-1, keepdims=True)
+        along = along / np.where(square > 0.0, square, np.inf)
+        values["angular_acceleration"] = _turn(thrust, derivatives[3] - along * jerk)
     return values
 
 
 def keeps(name: str, value: float, limit: float) -> bool:
     """Whether a value of a kind keeps its limit: from below for the least thrust acceleration."""
     return value >= limit if name.startswith("least_") else value <= limit
+
+
+def _turn(thrust: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """|F x y| / F.F of (..., 3) arrays; in free fall, where it has no value, infinite."""
+    square = (thrust * thrust).sum(axis=-1)
+    across = np.linalg.norm(np.cross(thrust, motion), axis=-1)
+    values: np.ndarray = np.where(square > 0.0, across, np.inf) / np.where(square > 0, square, 1.0)
+    return values
 
 
 def _positive(name: str, value: Any) -> float:

@@ -18,16 +18,13 @@ from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
 from peakflight.version import __version__
 
-DEFAULT_METHOD = "joint"
-"""What `plan` does if it is not told."""
-
 _log = logging.getLogger("peakflight")
 
 
 def plan(
     problem: Problem | ArrayLike,
     *,
-    method: str = DEFAULT_METHOD,
+    method: str = methods.DEFAULT_METHOD,
     settings: Any = None,
     limits: Limits | None = None,
     **options: Any,

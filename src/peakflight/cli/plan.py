@@ -15,7 +15,7 @@ from peakflight.course import Course, tidy
 from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
 from peakflight.formats import FLIGHT_WRITERS, read_course
 from peakflight.limits import Limits
-from peakflight.methods import METHODS
+from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.result import Plan
 
@@ -27,6 +27,28 @@ PICTURES = {
 }
 """Name without .png, and what it shows."""
 VARIANTS = ("descent", "paper")
+METHOD_OPTIONS = {
+    "peak": ("variant",),
+    "joint": ("pieces", "max_pieces", "effort", "time_limit"),
+}
+"""Fields of the settings of methods that are options here."""
+
+
+class Pieces(click.ParamType):  # type: ignore[type-arg]
+    """A whole number from 1, or auto."""
+
+    name = "N|auto"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int | str:
+        """The number, or the word."""
+        if value == "auto":
+            return "auto"
+        try:
+            return int(value)
+        except ValueError:
+            self.fail(f"{value!r} is neither a whole number nor auto", param, ctx)
 
 
 @click.command(short_help="Plan a course; write plan, flight files and pictures.")
@@ -34,14 +56,28 @@ VARIANTS = ("descent", "paper")
 @click.option(
     "--method",
     type=click.Choice(tuple(METHODS)),
-    default="peak",
-    show_default=True,
-    help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items()) + ".",
+    help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items())
+    + f". Default: {DEFAULT_METHOD}, or the method that a given option is of.",
 )
 @click.option(
     "--variant",
     type=click.Choice(VARIANTS),
     help="Of method peak: descent, the default, or the paper's Algorithm 1.",
+)
+@click.option(
+    "--pieces",
+    type=Pieces(),
+    help="Of method joint: polynomials in each leg, or auto, the default: where it pays.",
+)
+@click.option("--max-pieces", type=int, help="Of method joint: most polynomials in all.")
+@click.option(
+    "--effort",
+    type=float,
+    help="Of method joint: weight of the integral of the squared derivative that --minimize names, "
+    "from 0, the fastest, towards the smoothest.",
+)
+@click.option(
+    "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
 @click.option(
@@ -49,9 +85,9 @@ VARIANTS = ("descent", "paper")
     type=click.Choice(("jerk", "snap", "acceleration")),
     default="jerk",
     show_default=True,
-    help="Derivative whose square the spline minimizes.",
+    help="Derivative whose square a spline minimizes, and which --effort weighs.",
 )
-@click.option("--degree", type=int, help="Degree of the polynomials; by default the cost's own.")
+@click.option("--degree", type=int, help="Degree of the polynomials; by default the method's own.")
 @click.option("--continuity", type=int, help="Highest derivative that is continuous.")
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option(
@@ -72,8 +108,12 @@ VARIANTS = ("descent", "paper")
 @common_options
 def plan(
     course: Path,
-    method: str,
+    method: str | None,
     variant: str | None,
+    pieces: int | str | None,
+    max_pieces: int | None,
+    effort: float | None,
+    time_limit: float | None,
     limits: Limits | None,
     minimize: str,
     degree: int | None,
@@ -93,8 +133,15 @@ def plan(
     Example:
       peakflight plan course.csv --limits speed=5,jerk=62,tilt=50deg -o race
     """  # noqa: D301
-    if variant is not None and method != "peak":
-        raise click.UsageError(f"--variant is of method peak; method {method} has none")
+    tuning = {
+        "variant": variant,
+        "pieces": pieces,
+        "max_pieces": max_pieces,
+        "effort": effort,
+        "time_limit": time_limit,
+    }
+    tuning = {name: value for name, value in tuning.items() if value is not None}
+    method = _method(method, tuning)
     with Progress() as progress:
         progress.stage("reading the course")
         read, notes = _read(course, strict)
@@ -108,7 +155,7 @@ def plan(
         )
         with OutputFolder(output or folder_for(read.name)) as folder:
             progress.stage(f"planning {len(read)} waypoints by {method}")
-            answer = _solve(problem, method, variant)
+            answer = _solve(problem, method, tuning)
             remarks = (answer.message,) if answer.message and answer.feasible else ()
             if notes:
                 said = (*notes, answer.message) if answer.message else notes
@@ -154,12 +201,23 @@ def _read(path: Path, strict: bool) -> tuple[Course, tuple[str, ...]]:
         raise InvalidFile(f"{path}: {error}") from None
 
 
-def _solve(problem: Problem, method: str, variant: str | None) -> Plan:
-    from peakflight.methods import find
+def _method(method: str | None, tuning: dict[str, Any]) -> str:
+    """The method to plan with; options of other methods are refused."""
+    owners = {option: owner for owner, options in METHOD_OPTIONS.items() for option in options}
+    for name in tuning:
+        method = method or owners[name]
+        if method != owners[name]:
+            option = f"--{name.replace('_', '-')}"
+            raise click.UsageError(
+                f"{option} is of method {owners[name]}; method {method} has none"
+            )
+    return method or DEFAULT_METHOD
+
+
+def _solve(problem: Problem, method: str, tuning: dict[str, Any]) -> Plan:
     from peakflight.planner import plan as solve
 
-    settings: Any = None if variant is None else find(method).Settings(variant=variant)
-    return solve(problem, method=method, settings=settings)
+    return solve(problem, method=method, **tuning)
 
 
 def _write(

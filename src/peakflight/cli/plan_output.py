@@ -52,7 +52,7 @@ def print_plan(
             ("total time", f"{seconds(plan.duration)} s"),
             ("status", str(plan.status)),
             ("certified", proof),
-            ("method", f"{method}; degree {plan.trajectory.degree}"),
+            ("method", f"{method}; degree {plan.trajectory.degree}, {_count(plan)}"),
             ("planning time", f"{plan.wall_time_s:.3g} s"),
             ("iterations", str(plan.iterations)),
         ]
@@ -74,6 +74,11 @@ def print_plan(
     out.pairs((path.name, summaries[name]) for name, path in files.items())
     _print_notes(out, after)
     out.show()
+
+
+def _count(plan: Plan) -> str:
+    pieces = len(plan.trajectory)
+    return f"{pieces} piece{'' if pieces == 1 else 's'} in {len(plan.pieces)} legs"
 
 
 def _print_notes(out: Printout, notes: Sequence[str]) -> None:

@@ -23,7 +23,7 @@ from peakflight.figures.canvas import (
     write_headline,
     write_note,
 )
-from peakflight.limits import KINDS, LimitKind, limited_values
+from peakflight.limits import KINDS, LARGEST, LimitKind, limited_values
 from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 
@@ -91,6 +91,8 @@ def sampled_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
     """
     values = limited_values([trajectory.sample(count, order) for order in (1, 2, 3, 4)])
     values["tilt"] = np.degrees(values["tilt"])
+    for name in ("body_rate", "angular_acceleration"):  # in free fall they are infinite
+        values[name] = np.minimum(values[name], LARGEST)
     return values
 
 

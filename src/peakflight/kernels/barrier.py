@@ -17,7 +17,13 @@ import numpy as np
 
 from peakflight.kernels import classical, general
 from peakflight.kernels.jit import vector, within
-from peakflight.kernels.measures import EXPONENTS, KIND_ORDERS, add_slopes, measure
+from peakflight.kernels.measures import (
+    EXPONENTS,
+    KIND_ORDERS,
+    LOWEST_ORDERS,
+    add_slopes,
+    measure,
+)
 
 CAP = 2.0
 """Logarithm of m^(p/e) from where on it is continued by a parabola."""
@@ -32,8 +38,11 @@ BATCH = 64
 """Samples that are worked on together; the samples of a piece must divide it."""
 
 
-def workspace(count: int, degree: int) -> tuple[np.ndarray, ...]:
-    """Scratch arrays of `evaluate` for a number of pieces."""
+def workspace(count: int, degree: int, turning: bool) -> tuple[np.ndarray | None, ...]:
+    """Scratch arrays of `evaluate` for a number of pieces.
+
+    turning: whether kinds from TURNING on are limited; if not, kernels are compiled without them.
+    """
     batch = (3, 4, BATCH)
     return (
         np.empty((count, degree, 3)),
@@ -46,6 +55,7 @@ def workspace(count: int, degree: int) -> tuple[np.ndarray, ...]:
         np.zeros(BATCH),
         np.zeros(EXPONENTS.size, dtype=np.bool_),
         np.zeros(4, dtype=np.bool_),
+        np.zeros(batch) if turning else None,
     )
 
 
@@ -60,7 +70,7 @@ def evaluate(
     (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
     p = 24 * 2^doublings.
     """
-    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders = work
+    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders, pulls = work
     power = BASE_POWER * 2.0**doublings
     floor = np.exp(NEGLIGIBLE / power)  # of m^(1/e)
     cap = np.exp(CAP / power)
@@ -80,7 +90,8 @@ def evaluate(
             kinds[kind] = False
             for k in range(begin, end):
                 kinds[kind] |= watched[k, kind]
-            orders[KIND_ORDERS[kind] - 1] |= kinds[kind]
+            for row in range(LOWEST_ORDERS[kind] - 1, KIND_ORDERS[kind]):
+                orders[row] |= kinds[kind]
         for k in range(begin, end):
             total += times[k]
             gradient[k] = times[k] / reference
@@ -92,21 +103,21 @@ def evaluate(
             if not kinds[kind]:
                 continue
             row = KIND_ORDERS[kind] - 1
-            measure(kind, samples, squares, count, row, limits[kind], gravity, values)
+            measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls)
             if _count_above(values, count, floor ** EXPONENTS[kind]) == 0:
                 continue
             if highest < 0:
-                _clear(weights, vertical, count)
-            lowest = min(lowest, row)
+                _clear(weights, vertical, pulls, count)
+            lowest = min(lowest, LOWEST_ORDERS[kind] - 1)
             highest = max(highest, row)
             capped = _count_above(values, count, cap ** EXPONENTS[kind]) > 0
             barrier += _raise(values, count, EXPONENTS[kind], power, doublings, capped, grown)
             add_slopes(
                 kind, samples, squares, count, row, limits[kind], gravity, values, grown,
-                weights, vertical,
+                weights, vertical, pulls,
             )  # fmt: skip
         for row in range(lowest, highest + 1):
-            _pull(samples, weights, vertical, count, row)
+            _pull(samples, weights, vertical, pulls, count, row)
         for k in range(begin, end):
             gradient[k] -= _push(
                 rows, data, k, times[k], tables, by_piece, k - begin, lowest, highest, slope
@@ -124,7 +135,7 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     less the times will change, and the nearer a limit must be. Returns how many limits are exceeded
     that were not watched before.
     """
-    data, _, samples, squares, _, _, values, _, _, orders = work
+    data, _, samples, squares, _, _, values, _, _, orders, pulls = work
     nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
     missed = 0
     count = values.size  # BATCH, but not as a literal, for which callees compile once more
@@ -137,7 +148,7 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
         for kind in range(EXPONENTS.size):
             if limits[kind] > 0.0:
                 row = KIND_ORDERS[kind] - 1
-                measure(kind, samples, squares, count, row, limits[kind], gravity, values)
+                measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls)
                 if not watched[k, kind] and _count_above(values, count, 1.0) > 0:
                     missed += 1
                 bound = max(nearest, 0.0) ** EXPONENTS[kind]
@@ -218,12 +229,16 @@ def _square(samples, count, orders, out):
 
 
 @vector
-def _clear(weights, vertical, count):
+def _clear(weights, vertical, pulls, count):
     for row in range(4):
         for q in range(count):
             weights[row, q] = 0.0
     for q in range(count):
         vertical[q] = 0.0
+    if pulls is None:
+        pass
+    else:
+        pulls[:] = 0.0
 
 
 @vector
@@ -272,7 +287,7 @@ def _raise(values, count, base, power, doublings, capped, out):
 
 
 @vector
-def _pull(samples, weights, vertical, count, row):
+def _pull(samples, weights, vertical, pulls, count, row):
     """Samples <- slope of the barrier by each of them."""
     for d in range(3):
         for q in range(count):
@@ -280,6 +295,12 @@ def _pull(samples, weights, vertical, count, row):
     if row == 1:  # gravity acts on accelerations
         for q in range(count):
             samples[2, 1, q] += vertical[q]
+    if pulls is None:
+        pass
+    else:
+        for d in range(3):
+            for q in range(count):
+                samples[d, row, q] += pulls[d, row, q]
 
 
 @vector

@@ -8,20 +8,26 @@ steps) closes the gap between that bound and an attained value to a relative tol
 bounded beforehand and added to the control points, so that the bound holds for the polynomial that
 is written in the file, in exact arithmetic.
 
-A new kind of limit is one branch in `_quotient` and one in `_ratio`. Kinds are numbered as in
-`limits.KINDS`.
+A new kind of limit is one branch in `_quotient` and one in `_ratio`, or, where that is not enough,
+in `_range`: kinds from TURNING on are about several derivatives at once (`kernels.turning`). Kinds
+are numbered as in `limits.KINDS`.
 """
-
-from functools import lru_cache
-from math import comb, perm
 
 import numpy as np
 
+from peakflight.kernels.bernstein import (
+    EPSILON,
+    bernstein_tables,
+    control_points,
+    falling_factorials,
+)
 from peakflight.kernels.jit import inner, kernel, within
+from peakflight.kernels.turning import binomials, largest_turn, required_stretch
 
-KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
-"""The derivative that each kind is about."""
-EPSILON = 2.220446049250313e-16
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4])
+"""The highest derivative that each kind is about."""
+TURNING = 6
+"""Kinds from here on are about how the thrust direction turns."""
 DEPTH = 24
 """Intervals that wait at any one time; beyond, the hull of an interval is taken as it is."""
 NESTING = 40
@@ -40,42 +46,20 @@ LONGEST = 1e30
 """No stretch is longer than this."""
 
 
-@lru_cache
-def bernstein_tables(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Conversions for degrees up to `degree`.
-
-    Returns
-    -------
-    (N+1, N+1, N+1) for each degree n, control point i from coefficient j of u^j; and
-    (N+1, N+1, N+1) for each n, the weight of control points i, j in number i+j of a product.
-    """
-    size = degree + 1
-    convert = np.zeros((size, size, size))
-    product = np.zeros((size, size, size))
-    for n in range(size):
-        for i in range(n + 1):
-            for j in range(n + 1):
-                product[n, i, j] = comb(n, i) * comb(n, j) / comb(2 * n, i + j)
-                if j <= i:
-                    convert[n, i, j] = comb(i, j) / comb(n, j)
-    return convert, product
-
-
-@lru_cache
-def falling_factorials(degree: int) -> np.ndarray:
-    """(max(N, 4) + 1, N+1): factor of coefficient j in derivative s, j! / (j-s)!."""
-    orders = range(max(degree, 4) + 1)
-    return np.array([[float(perm(j, s)) for j in range(degree + 1)] for s in orders])
+def lookup_tables(degree: int) -> tuple[np.ndarray, ...]:
+    """What `certify` and `stretch` look up for pieces of a degree."""
+    return (*bernstein_tables(degree), falling_factorials(degree), binomials(degree))
 
 
 @kernel
-def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place):
+def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns):
     """Certified kappa of every piece and kind.
 
     coefficients (K, N+1, 3), times (K,), limits as `Limits.as_array`; tables: of
-    `bernstein_tables` and `falling_factorials`; upper and lower (K, kinds) get the bound and, but
+    `lookup_tables`; upper and lower (K, kinds) get the bound and, but
     for rounding, a value that is attained (NaN for kinds that are not limited), place (K, kinds)
-    where, in normalised time.
+    where, in normalised time. turns: `turning.workspace`,
+    or None where no kind from TURNING on is limited: it is compiled without them then.
     """
     degree = coefficients.shape[1] - 1
     points = np.empty((degree + 1, 3))
@@ -89,22 +73,16 @@ def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
             place[k, kind] = 0.0
             if not limits[kind] > 0.0:
                 continue
-            size, plain, defined = _quotient(
-                kind, coefficients, k, times[k], gravity, tables, points, numerators, denominators,
-                ends,
+            low, high, place[k, kind] = _range(
+                kind, coefficients, k, times[k], gravity, tables, tolerance, points, numerators,
+                denominators, ends, turns,
             )  # fmt: skip
-            high = np.inf
-            low = np.inf
-            if defined:
-                low, high, place[k, kind] = _largest(
-                    numerators, denominators, plain, size, tolerance, ends
-                )
             upper[k, kind] = _ratio(kind, high, limits[kind], True)
             lower[k, kind] = _ratio(kind, low, limits[kind], False)
 
 
 @kernel
-def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place):
+def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns):
     """Scale a trajectory by the smallest uniform stretch that keeps every limit, certified.
 
     As `certify`, with coefficients and times replaced; upper, lower and place are scratch. Returns
@@ -117,7 +95,7 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
     infeasible = 0.0  # the largest factor that is known not to do
     best = np.inf
     for _ in range(ROUNDS):
-        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place)
+        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns)
         feasible = True
         needed = 0.0
         for k in range(times.size):
@@ -128,7 +106,9 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
                     at = place[k, kind]
                     needed = max(
                         needed,
-                        _needed(kind, coefficients, k, times[k], at, limits, gravity, tables[2]),
+                        _needed(
+                            kind, coefficients, k, times[k], at, limits, gravity, tables[2], turns
+                        ),
                     )
         if feasible:
             best = min(best, factor)
@@ -170,9 +150,15 @@ def _rescale(coefficients, times, factor, scaled_coefficients, scaled_times):
 
 
 @inner
-def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials):
+def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials, turns):
     """Uniform stretch that one kind asks for at one point of a piece."""
     order = KIND_ORDERS[kind]
+    if turns is None:
+        pass
+    elif kind >= TURNING:
+        return required_stretch(
+            order, coefficients, piece, time, place, limits[kind], gravity, factorials, turns[2]
+        )
     x = 0.0
     y = 0.0
     z = 0.0
@@ -203,6 +189,27 @@ def _required_stretch(kind, x, y, z, limit, gravity):
     return (np.sqrt(square) / limit) ** (1.0 / KIND_ORDERS[kind])
 
 
+@inner
+def _range(
+    kind, coefficients, piece, time, gravity, tables, tolerance, points, numerators, denominators,
+    ends, turns,
+):  # fmt: skip
+    """Bounds of the largest value of what a kind is about, from below and above, and where."""
+    if turns is None:
+        pass
+    elif kind >= TURNING:
+        return largest_turn(
+            KIND_ORDERS[kind], coefficients, piece, time, gravity, tables, tolerance, points, turns,
+            ends,
+        )  # fmt: skip
+    size, plain, defined = _quotient(
+        kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
+    )
+    if not defined:
+        return np.inf, np.inf, 0.0
+    return _largest(numerators, denominators, plain, size, tolerance, ends)
+
+
 @within
 def _quotient(
     kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
@@ -214,8 +221,9 @@ def _quotient(
     order = KIND_ORDERS[kind]
     gravity = gravity if order == 2 else 0.0
     plain = kind not in (4, 5)
-    degree, error = _control_points(
-        coefficients, piece, time, order, gravity, tables[0], tables[2], points
+    degree = max(coefficients.shape[1] - 1 - order, 0)
+    error, _ = control_points(
+        coefficients, piece, time, order, degree, gravity, tables[0], tables[2], points
     )
     if not error < np.inf:  # overflow, or not a number
         return 2 * degree, plain, False
@@ -249,40 +257,6 @@ def _ratio(kind, value, limit, is_bound):
     else:
         ratio = root / limit
     return UNBOUNDED if np.isnan(ratio) else min(ratio * slack, UNBOUNDED)
-
-
-@inner
-def _control_points(coefficients, piece, time, order, gravity, convert, factorials, points):
-    """Points (n+1, 3) <- Bernstein control points of a derivative, with g added to the third axis.
-
-    Returns their degree and a bound of the rounding error of each entry's norm.
-    """
-    degree = coefficients.shape[1] - 1 - order
-    if degree < 0:
-        degree = 0
-        points[0, 0] = 0.0
-        points[0, 1] = 0.0
-        points[0, 2] = gravity
-        return degree, 0.0
-    worst = 0.0
-    for i in range(degree + 1):
-        total = 0.0
-        for d in range(3):
-            value = gravity if d == 2 else 0.0
-            size = abs(value)
-            power = 1.0
-            for j in range(i + 1):
-                term = (
-                    convert[degree, i, j] * factorials[order, j + order]
-                    * coefficients[piece, j + order, d] * power
-                )  # fmt: skip
-                value += term
-                size += abs(term)
-                power *= time
-            points[i, d] = value
-            total += size * size
-        worst = max(worst, total)
-    return degree, (2 * degree + 8) * EPSILON * np.sqrt(worst)
 
 
 @inner

@@ -38,12 +38,20 @@ NEARNESS = 5e-3
 DEEPEST = 0.5
 """No limit is lowered below this part of itself."""
 PATIENCE = 15
-"""Iterations without gain after which a run ends as stalled; 4 once the gap is closed."""
+"""Iterations without gain after which a run ends: as solved if only the stretch is in the way, of
+the best iterate up to ten times the tolerance; else as stalled."""
 STRETCHES = 4
 """Stretches of a start; one does, save for kinds whose stretch is an estimate."""
-STIFFNESS = 10.0
+STIFFNESS, STIFFEST = 10.0, 1e4
 """What the matrix has more than the objective's own curvature in the logarithms of the durations of
-parts of a leg: where a leg is cut matters little, and steps along it would be long."""
+parts of a leg, at least and at most: where a leg is cut matters little, and steps along it would be
+long."""
+UNRULY, TAME = 0.5, 0.1
+"""A piece whose residual exceeds what the step promised by more than this part of what it was is
+stiffened; by less, loosened."""
+NOTICED = 1e-3
+"""Mean residual of a piece below which it counts as tame."""
+STIFFER, LOOSER = 3.0, 0.5
 GAIN = 1e-4
 """Relative fall of the objective that counts as a gain."""
 SOLVED, LIMIT, STALLED = 0, 1, 2
@@ -109,6 +117,8 @@ class Limited(NamedTuple):
     """(4,) weight of the integral of each squared derivative in the objective; None likewise."""
     gravity: np.ndarray
     """(1,) m/s^2."""
+    least: np.ndarray
+    """(1,) smallest stretch of interest: 1 where going faster is not for free, else 0."""
 
 
 class Work(NamedTuple):
@@ -138,6 +148,8 @@ class Work(NamedTuple):
     """(n, w) H."""
     factor: np.ndarray
     """(n, w)."""
+    stiffness: np.ndarray
+    """(K,) of parts of legs, see `STIFFNESS`; 0 for whole legs."""
     marks: np.ndarray
     """(8,): see the constants below."""
 
@@ -158,6 +170,10 @@ class Begin(NamedTuple):
     """Weight of all constraints together, mu times their number, as a part of the total time."""
     slack: float
     """Least slack that a constraint starts with."""
+    stiffness: float
+    """Of whole legs, see `STIFFNESS`; parts of legs have it anyway."""
+    slowly: float
+    """Part of the way that lowered limits move in an iteration: all at once, some would swing."""
     kept: float
     """1 if work.dual holds multipliers of a similar problem, which are then kept where they are
     larger than mu over the slack; else 0."""
@@ -228,11 +244,12 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
                 break
             if halving < HALVINGS:
                 primal *= 0.5
+        _stiffen(layout, work, residual, slack_step, primal)
         for i in range(x.size):
             x[i] = trial[i]
         marks[COUNT] += 1.0
         if marks[GAP] < NEARNESS:
-            _lower(layout, grid, limited, work, x)
+            _lower(layout, grid, limited, work, x, begin.slowly)
             needed, time, effort = _evaluate(layout, grid, limited, work, x)
             objective = time * needed + effort
             if marks[LOWERED] == 0.0:
@@ -249,16 +266,18 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
         if marks[BEST] < marks[REFERENCE] * (1.0 - GAIN):
             marks[REFERENCE] = marks[BEST]
             marks[LAST] = marks[COUNT]
-        if marks[LOWERED] > 0.0 and marks[GAP] < tolerance:
+        closed = marks[LOWERED] > 0.0 and marks[GAP] < tolerance
+        if closed:
             _gradient(layout, grid, limited, work, x, dual, step)
             for i in range(x.size):
                 trial[i] = step[i]
             band.solve(work.factor, trial)
             marks[DECREMENT] = 0.5 * _product_of(trial, step) / (time + effort)
-            if marks[DECREMENT] < tolerance and needed < 1.0 + tolerance:
+            closed = marks[DECREMENT] < tolerance
+            if closed and needed < 1.0 + tolerance:
                 return SOLVED
         if marks[GAP] < 10.0 * tolerance and marks[COUNT] - marks[LAST] >= PATIENCE:
-            return SOLVED if marks[DECREMENT] < tolerance else STALLED
+            return SOLVED if closed and marks[STRETCH] < 1.0 + 10.0 * tolerance else STALLED
     return LIMIT
 
 
@@ -286,6 +305,8 @@ def _begin(layout, grid, limited, work, begin):
         slack[i] = max(-values[i], begin.slack)
         central = begin.barrier * time / (values.size * slack[i])
         dual[i] = max(central, begin.kept * dual[i])
+    for k in range(layout.clock.size):
+        work.stiffness[k] = STIFFNESS if layout.steps[k] else begin.stiffness
     marks = work.marks
     for i in range(marks.size):
         marks[i] = 0.0
@@ -296,6 +317,31 @@ def _begin(layout, grid, limited, work, begin):
     marks[DECREMENT] = np.inf
     for i in range(work.x.size):
         work.best[i] = work.x[i]
+
+
+@inner
+def _stiffen(layout, work, residual, slack_step, primal):
+    """Stiffen parts of legs whose constraints do not go where the step was to lead them.
+
+    Snap in a short piece changes with the fourth power of its duration: there the linear picture
+    that a step is made with fails first, and steps that are too long would fail again and again.
+    """
+    values = work.values.reshape(-1)
+    slack = work.slack.reshape(-1)
+    count = residual.size // layout.clock.size
+    for k in range(layout.clock.size):
+        if work.stiffness[k] == 0.0:
+            continue
+        before = 0.0
+        after = 0.0
+        for i in range(k * count, (k + 1) * count):
+            before += abs(residual[i])
+            after += abs(values[i] + slack[i] + primal * slack_step[i])
+        excess = after - (1.0 - primal) * before
+        if excess > UNRULY * before and after > NOTICED * count:
+            work.stiffness[k] = min(STIFFER * work.stiffness[k], STIFFEST)
+        elif excess < TAME * before or after < NOTICED * count:
+            work.stiffness[k] = max(LOOSER * work.stiffness[k], STIFFNESS)
 
 
 @vector
@@ -366,7 +412,7 @@ def _evaluate(layout, grid, limited, work, x):
     """Samples and constraints at x; returns the stretch that they need, total time and effort."""
     count = grid.table.shape[2]
     data = np.empty((grid.orders.size, 3))
-    needed = 0.0 if limited.effort is None else 1.0  # what is weighed against time may be slow
+    needed = limited.least[0]
     total = 0.0
     effort = 0.0
     for k in range(layout.clock.size):
@@ -512,7 +558,7 @@ def _assemble(layout, grid, limited, work, x):
             weights, work.rates[k], grid.orders, time, grid.table, grid.pairs, wanted,
             grid.products, powers, sums, columns, local,
         )  # fmt: skip
-        local[3 * rows_, 3 * rows_] += time * (1.0 + STIFFNESS if layout.steps[k] else 1.0)
+        local[3 * rows_, 3 * rows_] += time * (1.0 + work.stiffness[k])
         _add_outer(limited.turning, grid, limited, work, k, time, local)
         _add_effort(
             limited.effort, grid, limited, work, k, time, weights, powers, sums, columns, local
@@ -607,7 +653,7 @@ def _scatter(layout, k, local, matrix):
 
 
 @within
-def _lower(layout, grid, limited, work, x):
+def _lower(layout, grid, limited, work, x, slowly):
     """Lower the limit of each sample by how much more than the sample its cell reaches."""
     count = grid.table.shape[2]
     cells = grid.dense.shape[2] // count
@@ -639,7 +685,8 @@ def _lower(layout, grid, limited, work, x):
                             value += (right - left) ** 2 / (8.0 * curve)
                     peak = max(peak, value)
                 ratio = min(max(there[q] / peak, DEEPEST), 1.0)
-                work.limits[k, r, q] = limit / ratio if kind == LEAST else limit * ratio
+                lowered = limit / ratio if kind == LEAST else limit * ratio
+                work.limits[k, r, q] += slowly * (lowered - work.limits[k, r, q])
 
 
 LEAST = 5

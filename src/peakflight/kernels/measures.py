@@ -6,34 +6,49 @@ slower the sample would have to be passed (design's "uniform stretch"): then no 
 another in the barrier of `kernels.barrier`.
 
 The slope of (log m)/e by a derivative d is given as weight * d + vertical * e3, which suits
-everything that knows no direction but gravity's. A new kind is one pair of functions, values and
-slopes, a line in `measure` and `add_slopes`, an exponent and an order. Kinds are numbered as in
-`limits.KINDS`.
+everything that knows no direction but gravity's; kinds that know others, from TURNING on, write it
+out. A new kind is one pair of functions, values and slopes, a line in `measure` and `add_slopes`,
+an exponent and its orders. Kinds are numbered as in `limits.KINDS`.
+
+How the thrust direction turns is |F x y| / F.F with F = a + g e3, for the body rate with y = j, for
+its angular acceleration with y = s - 2 (F.j / F.F) j. Near free fall that is not defined; F has an
+entry of GUARD g in a fourth direction here, so that turning there is fast, but finite.
 """
 
 import numpy as np
 
 from peakflight.kernels.jit import inner, vector
 
-EXPONENTS = np.array([2, 2, 6, 8, 2, 2])
+EXPONENTS = np.array([2, 2, 6, 8, 2, 2, 6, 8])
 """e of each kind."""
-KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2])
-"""The derivative that each kind is about."""
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4])
+"""The highest derivative that each kind is about."""
+LOWEST_ORDERS = np.array([1, 2, 3, 4, 2, 2, 2, 2])
+"""The lowest."""
+TURNING = 6
+"""Kinds from here on are about how the thrust direction turns."""
 TINY = 1e-150
 """Added to what is divided by: a sample at rest has measure zero and slope zero."""
 ROUNDNESS = 1e-5
 """Least horizontal acceleration, as a part of gravity, that tilt knows: no kink when upright."""
 SOFTNESS = 1e-3
 """How early, as a part of gravity, the measure of tilt bends on its way to zero."""
+GUARD = 1e-3
+"""Thrust acceleration, as a part of gravity, that the thrust direction has in any case."""
 
 
 @inner
-def measure(kind, samples, squares, count, row, limit, gravity, values):
+def measure(kind, samples, squares, count, row, limit, gravity, values, pulls):
     """Values <- m of the first `count` samples.
 
     samples (3, 4, S) are derivatives 1 to 4, squares (4, S) their squared norms; row: which
-    derivative the kind is about, less one.
+    derivative the kind is about, less one; pulls: as in `add_slopes`.
     """
+    if pulls is None:
+        pass
+    elif kind >= TURNING:
+        _turn(samples, count, row, limit, gravity, values)
+        return
     if kind == 1:
         _thrust(samples, squares, count, row, limit, gravity, values)
     elif kind == 4:
@@ -46,9 +61,20 @@ def measure(kind, samples, squares, count, row, limit, gravity, values):
 
 @inner
 def add_slopes(
-    kind, samples, squares, count, row, limit, gravity, values, grown, weights, vertical
-):
-    """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m."""
+    kind, samples, squares, count, row, limit, gravity, values, grown, weights, vertical,
+    pulls,
+):  # fmt: skip
+    """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m.
+
+    Kinds from TURNING on add to pulls (3, 4, S) instead; it is None where none of them is limited,
+    which is known when the kernel is compiled.
+    """
+    if pulls is None:
+        pass
+    elif kind >= TURNING:
+        factor = 1.0 / EXPONENTS[kind]
+        _add_turn(samples, count, row, limit, gravity, factor, values, grown, pulls)
+        return
     if kind == 1:
         _add_thrust(samples, count, row, limit, gravity, values, grown, weights, vertical)
     elif kind == 4:
@@ -146,3 +172,61 @@ def _add_least_thrust(samples, squares, count, row, gravity, grown, weights, ver
         push = grown[q] / (max(square, 0.0) + TINY)
         weights[row, q] -= push
         vertical[q] -= gravity * push
+
+
+@vector
+def _turn(samples, count, row, limit, gravity, values):
+    """(|F x y| / F.F)^2 / limit^2, as (y.y - (F.y)^2 / F.F) / F.F; see the top."""
+    guard = (GUARD * gravity) ** 2
+    twist = 2.0 if row == 3 else 0.0
+    factor = 1.0 / (limit * limit)
+    for q in range(count):
+        fx = samples[0, 1, q]
+        fy = samples[1, 1, q]
+        fz = samples[2, 1, q] + gravity
+        inverse = 1.0 / (fx * fx + fy * fy + fz * fz + guard)
+        jx = samples[0, 2, q]
+        jy = samples[1, 2, q]
+        jz = samples[2, 2, q]
+        r = twist * inverse * (fx * jx + fy * jy + fz * jz)
+        x = samples[0, row, q] - r * jx
+        y = samples[1, row, q] - r * jy
+        z = samples[2, row, q] - r * jz
+        along = fx * x + fy * y + fz * z
+        across = max(x * x + y * y + z * z - along * along * inverse, 0.0)
+        values[q] = factor * inverse * across
+
+
+@vector
+def _add_turn(samples, count, row, limit, gravity, factor, values, grown, pulls):
+    guard = (GUARD * gravity) ** 2
+    twist = 2.0 if row == 3 else 0.0
+    for q in range(count):
+        fx = samples[0, 1, q]
+        fy = samples[1, 1, q]
+        fz = samples[2, 1, q] + gravity
+        inverse = 1.0 / (fx * fx + fy * fy + fz * fz + guard)
+        jx = samples[0, 2, q]
+        jy = samples[1, 2, q]
+        jz = samples[2, 2, q]
+        r = twist * inverse * (fx * jx + fy * jy + fz * jz)
+        x = samples[0, row, q] - r * jx
+        y = samples[1, row, q] - r * jy
+        z = samples[2, row, q] - r * jz
+        c = inverse * (fx * x + fy * y + fz * z)
+        whole = 2.0 * factor * grown[q]
+        push = whole * inverse / (limit * limit * values[q] + TINY)
+        x = push * (x - c * fx)  # the slope by y
+        y = push * (y - c * fy)
+        z = push * (z - c * fz)
+        k = twist * inverse * (x * jx + y * jy + z * jz)  # minus that by F.j
+        f = r * k - whole * inverse
+        pulls[0, 1, q] += f * fx - c * x - k * jx
+        pulls[1, 1, q] += f * fy - c * y - k * jy
+        pulls[2, 1, q] += f * fz - c * z - k * jz
+        pulls[0, 2, q] -= r * x + k * fx
+        pulls[1, 2, q] -= r * y + k * fy
+        pulls[2, 2, q] -= r * z + k * fz
+        pulls[0, row, q] += x
+        pulls[1, row, q] += y
+        pulls[2, row, q] += z

@@ -152,8 +152,13 @@ def get_data(layout: Layout, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
     return data, starts, np.exp(x[layout.clock])
 
 
-def make_limited(limits: np.ndarray, effort: np.ndarray | None, gravity: float) -> Limited:
-    """What is limited, from `Limits.as_array` and weights (4,) of integrals of squares, or None."""
+def make_limited(
+    limits: np.ndarray, effort: np.ndarray | None, gravity: float, least: float = 0.0
+) -> Limited:
+    """What is limited, from `Limits.as_array` and weights (4,) of integrals of squares, or None.
+
+    least: smallest stretch of interest, see `Limited`.
+    """
     kinds = np.flatnonzero(np.isfinite(limits))
     terms = [KIND_TERMS[kind] for kind in kinds]
     return Limited(
@@ -164,6 +169,7 @@ def make_limited(limits: np.ndarray, effort: np.ndarray | None, gravity: float) 
         turning=np.ones(1) if any(len(term) > 1 for term in terms) else None,
         effort=effort,
         gravity=np.array([gravity]),
+        least=np.array([least]),
     )
 
 
@@ -187,5 +193,6 @@ def make_work(layout: Layout, grid: Grid, limited: Limited) -> Work:
         dual=np.zeros(rows),
         matrix=np.empty((unknowns, width)),
         factor=np.empty((unknowns, width)),
+        stiffness=np.empty(pieces),
         marks=np.zeros(MARKS),
     )

@@ -22,6 +22,8 @@ METHODS = {
     "joint": "durations and coefficients together: the fastest",
 }
 """Name, which is also that of the module, and what it does in a line."""
+DEFAULT_METHOD = "joint"
+"""What plans where none is named."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,9 +82,10 @@ def require_whole(name: str, value: int, low: int, high: int) -> None:
 
 
 def spline_kernels(problem: Problem) -> str:
-    """Which kernels solve the spline of a problem."""
+    """Which kernels solve the spline of a problem and look at its limits."""
     plain = problem.spline_class.is_classical and not problem.derivatives
-    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}"
+    turning = "-turning" if problem.limits.on_turning else ""
+    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}{turning}"
 
 
 def find(name: str) -> Method:

@@ -16,13 +16,12 @@ from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
 from peakflight.kernels.interior import Begin, Layout
-from peakflight.kernels.rows import KIND_TERMS
 from peakflight.limits import GRAVITY, KINDS
 from peakflight.methods import Outcome, peak, proportional, require, require_whole
 from peakflight.methods.idle import idle_times, parts_for
-from peakflight.problem import DEGREES, Problem, derivative_name
+from peakflight.problem import DEGREES, Problem, SplineClass, derivative_name
 from peakflight.result import History, Plan
-from peakflight.spline import coefficients_of
+from peakflight.spline import SplineTask, coefficients_of
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
 DEGREE = 7
@@ -30,25 +29,35 @@ DEGREE = 7
 STARTS = ("guess", "proportional", "peak")
 SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
-ROUGH = 1e-2
+ROUGH = 1e-3
 """Tolerance of a solution that is only cut into pieces."""
-FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, kept=0.0)
+FRESH = Begin(margin=1.05, barrier=0.3, slack=1e-3, stiffness=0.0, slowly=1.0, kept=0.0)
 """From a guess."""
-GOING_ON = Begin(margin=1.02, barrier=0.1, slack=1e-3, kept=0.0)
-"""From a solution: of this problem, or of one with fewer pieces."""
-WARM = Begin(margin=0.0, barrier=0.01, slack=3e-2, kept=1.0)
+GOING_ON = FRESH._replace(margin=1.02, barrier=0.1)
+"""From a solution: of this problem with fewer pieces."""
+AGAIN = GOING_ON._replace(stiffness=10.0, slowly=0.5)
+"""From where a run has stalled."""
+WARM = FRESH._replace(margin=0.0, barrier=0.01, slack=3e-2, kept=1.0)
 """From the solution of a similar problem."""
 CHUNK = 4
 """Iterations between looks at the clock, if there is a time limit."""
 TIGHTENINGS = 8
 """Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
+NARROWINGS, NARROW = 4, 5e-4
+"""Rounds of the same, where peaks between samples would cost more than this part of the time."""
 HOPELESS = 0.2
 """Excess over a limit that lowering limits is not tried for."""
 ROUNDS = 3
 """Most rounds of cutting legs."""
 ENOUGH = 1.3
 """Times the allowance of idle time; a cut for less is not worth its iterations."""
-RETRIES = 2
+EASE, EASE_OF_MANY = 0.5, 0.0
+"""Of the guess, for whole legs and where legs are cut: which of them ends better was measured."""
+GAIN_OF_CUT = 1e-3
+"""Relative gain of a cut below which legs are not cut again."""
+FEW = 4
+"""Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
+RETRIES = 4
 """Runs from where a run has stalled; a new barrier often gets it going."""
 FELL_BACK = "joint found nothing faster than peak, whose plan this is"
 
@@ -58,17 +67,18 @@ class Settings:
     """Tuning of `joint`."""
 
     pieces: int | Literal["auto"] = "auto"
-    """Polynomials in each leg; "auto" cuts legs where it pays."""
+    """Polynomials in each leg; "auto" cuts legs where it pays, and keeps those of a plan to begin
+    from."""
     max_pieces: int | None = None
     """Most polynomials in all; None for no limit of its own (a Crazyflie holds 31)."""
     effort: float = 0.0
-    """Weight, in s, of the integral of what the problem minimizes (squared jerk or snap): from the
-    fastest, 0, to the smoothest."""
+    """Weight of the integral of what the problem minimizes beside the total time, in s^6/m^2 for
+    jerk and s^8/m^2 for snap: from the fastest, 0, to the smoothest."""
     initial: Literal["guess", "proportional", "peak"] | Plan = "guess"
     """Where to begin: from a guess of durations and velocities, from another method's result, or
     from a plan, best of the same course with something changed."""
     time_limit: float | None = None
-    """s, after which the best plan so far is returned."""
+    """s, after which the best plan so far is returned; None for no limit."""
     tolerance: float = 1e-4
     """Relative: of the gap, the stretch and the decrement at which the problem counts as solved."""
     idle_tolerance: float = 1.2e-3
@@ -138,6 +148,10 @@ class _Run:
     pieces: np.ndarray
     objective: float
     """Of the trajectory, as far as samples tell."""
+    ended: bool
+    """Whether it met its own tolerance."""
+    solved: bool
+    """Whether it met that of the settings."""
     code: int
     iterations: int
     dual: np.ndarray
@@ -146,8 +160,8 @@ class _Run:
 
 def kernels(problem: Problem, settings: Settings) -> str:
     """Those of the kinds of limit and of effort."""
-    turning = any(len(KIND_TERMS[KINDS.index(kind)]) > 1 for kind in problem.limits.active)
-    return f"joint-{'turning' if turning else 'plain'}-{'effort' if settings.effort else 'time'}"
+    turning = "turning" if problem.limits.on_turning else "plain"
+    return f"joint-{turning}-{'effort' if settings.effort else 'time'}"
 
 
 def solve(problem: Problem, settings: Settings) -> Outcome:
@@ -157,21 +171,25 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     complete = _complete(problem)
     task = _Task(complete, settings, _effort(complete, settings), deadline)
     legs = len(complete.waypoints) - 1
-    if settings.max_pieces is not None:
-        each = 1 if settings.pieces == "auto" else settings.pieces
-        if settings.max_pieces < each * legs:
+    if settings.max_pieces is not None and settings.max_pieces < legs:
+        raise InvalidProblem(
+            f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
+        )
+    if settings.max_pieces is not None and settings.pieces != "auto":
+        total = legs * settings.pieces
+        if total > settings.max_pieces:
             raise InvalidProblem(
-                f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs "
-                f"{'one' if each == 1 else each}"
+                f"{settings.pieces} pieces in each of {legs} legs are {total}; max_pieces is "
+                f"{settings.max_pieces}"
             )
     runs = _runs(task, problem)
     outcome = _finished(task, runs)
-    if outcome.status in (Status.INFEASIBLE, Status.NO_PROGRESS, Status.ITERATION_LIMIT):
+    infeasible = outcome.status is Status.INFEASIBLE
+    doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
+    if infeasible or (doubtful and task.effort is None):
         other = peak.solve(_without_class(problem), peak.Settings())
-        if other.status is not Status.INFEASIBLE and (
-            outcome.status is Status.INFEASIBLE
-            or (task.effort is None and other.trajectory.duration < outcome.trajectory.duration)
-        ):
+        found = other.status is not Status.INFEASIBLE
+        if found and (infeasible or other.trajectory.duration < outcome.trajectory.duration):
             status = Status.TIME_LIMIT if task.is_late else Status.NO_PROGRESS
             outcome = replace(other, status=status, message=FELL_BACK)
             complete = _without_class(problem)
@@ -239,43 +257,47 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
     start, begin = _given(task, problem), FRESH
     cuts = settings.pieces != 1
     if start is None:
-        start = _guess(task.problem)
+        start = _guess(task.problem, EASE_OF_MANY if cuts else EASE)
     elif isinstance(settings.initial, Plan):
-        begin = WARM
-        cuts = cuts and not (start.pieces > 1).any()
+        begin, cuts = WARM, False
     runs = [_run(task, start, begin, ROUGH if cuts else settings.tolerance)]
-    if cuts and runs[0].code != interior.SOLVED:
+    if cuts and not runs[0].ended:
         runs.append(
             _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
         )
     for _ in range(ROUNDS if cuts else 0):
         last = runs[-1]
         parts = _parts(task, last)
-        if task.is_late or (parts == 1).all():
+        if not last.ended or task.is_late or (parts == 1).all():
             break
         trajectory = last.trajectory.subdivide(parts)
         leg = np.repeat(np.arange(len(last.pieces)), last.pieces)
         pieces = np.bincount(leg, weights=parts).astype(np.int64)
         runs.append(_run(task, _start_of(trajectory, pieces, task.problem), GOING_ON))
-        if runs[-1].objective > (1.0 - settings.tolerance) * last.objective:
+        if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
-    if cuts and len(runs) == 1:  # nothing to cut
+    if not runs[-1].solved and runs[-1].ended:  # nothing to cut: only a rough run so far
         runs.append(
             _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
         )
     for _ in range(RETRIES):
         last = runs[-1]
-        if last.code == interior.SOLVED or task.is_late:
+        if last.solved or task.is_late:
             break
-        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), GOING_ON))
+        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), AGAIN))
     return runs
 
 
 def _parts(task: _Task, run: _Run) -> np.ndarray:
     """(K,) into how many parts each piece is cut next."""
     settings = task.settings
+    whole = (run.pieces == 1).all()
     if settings.pieces != "auto":
-        return np.full(len(run.trajectory), settings.pieces if (run.pieces == 1).all() else 1)
+        return np.full(len(run.trajectory), settings.pieces if whole else 1)
+    if task.effort is not None:  # limits are not what holds it back: in halves, as long as it pays
+        parts = np.full(len(run.trajectory), 2)
+        most = settings.max_pieces
+        return parts if most is None or parts.sum() <= most else np.ones_like(parts)
     idle = idle_times(run.trajectory, task.problem.limits)
     allowance = settings.idle_tolerance * run.trajectory.duration
     if idle.sum() < ENOUGH * allowance:
@@ -299,12 +321,15 @@ def _run(
     whole = len(start.times) == len(start.pieces)
     grid = unknowns.make_grid(class_.degree, SAMPLES if whole else SAMPLES_OF_MANY)
     limits = problem.limits.as_array() if limits is None else limits
-    limited = unknowns.make_limited(limits, task.effort, GRAVITY)
+    free = problem.is_at_rest and task.effort is None
+    limited = unknowns.make_limited(limits, task.effort, GRAVITY, 0.0 if free else 1.0)
     work = unknowns.make_work(layout, grid, limited)
     unknowns.set_unknowns(layout, start.data, start.starts, start.times, work.x)
     if start.dual is not None and start.dual.shape == work.dual.shape:
         work.dual[:] = start.dual
     tolerance = settings.tolerance if tolerance is None else tolerance
+    if not problem.is_at_rest and begin in (GOING_ON, AGAIN):
+        begin = begin._replace(margin=0.0, slack=WARM.slack)
     at_once = settings.iterations if math.isinf(task.deadline) else CHUNK
     code, left, anew = interior.LIMIT, settings.iterations, True
     while code == interior.LIMIT and left > 0 and (anew or not task.is_late):
@@ -314,15 +339,19 @@ def _run(
     x = work.x
     if not _is_sound(layout, x):  # gone astray
         x, code = work.best, interior.STALLED
-        if not _is_sound(layout, x):
-            unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
     if problem.is_at_rest:  # the best iterate, stretched to what its samples allow
-        stretch = work.marks[interior.STRETCH]  # at least 1 with effort
+        stretch = work.marks[interior.STRETCH]
         is_time = layout.order < 0
         x = np.where(
             is_time, work.best + np.log(stretch), work.best / stretch ** np.maximum(layout.order, 0)
         )
+    if not _is_sound(layout, x):
+        unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
     data, starts, times = unknowns.get_data(layout, x)
+    ended = code == interior.SOLVED
+    times = np.clip(
+        times, SHORTEST, LONGEST
+    )  # a run that diverges ends in no answer, not in an error
     leg = np.repeat(np.arange(len(start.pieces)), start.pieces)
     orders = basis.row_orders(class_.degree)[:-1]
     coefficients = coefficients_of(
@@ -332,6 +361,8 @@ def _run(
         Trajectory(coefficients, times),
         start.pieces,
         float(work.marks[interior.BEST]),
+        ended,
+        ended and tolerance <= settings.tolerance,
         code,
         int(work.marks[interior.COUNT]),
         work.dual,
@@ -351,20 +382,16 @@ def _is_sound(layout: Layout, x: np.ndarray) -> bool:
 def _finished(task: _Task, runs: list[_Run]) -> Outcome:
     """The best run, made feasible exactly."""
     for run in sorted(runs, key=lambda run: run.objective):
-        found, at_rest = None, task.problem.is_at_rest
-        if at_rest:
-            stretched = stretch_to_limits(run.trajectory, task.problem.limits)
-            found = None if stretched is None else stretched[0]
-            if stretched is not None and task.effort is not None and stretched[1] < 1.0:
-                found = run.trajectory  # no faster than it wants to be
+        if task.problem.is_at_rest:
+            found, last = _stretched(task, run)
         else:
-            found = _tightened(task, run)
+            found, last = _tightened(task, run)
         if found is not None:
             return Outcome(
-                status=_status(task, run),
+                status=_status(task, last),
                 trajectory=found,
                 pieces=tuple(run.pieces.tolist()),
-                memory=run.dual,
+                memory=last.dual,
             )
     return Outcome(
         status=Status.INFEASIBLE,
@@ -375,31 +402,65 @@ def _finished(task: _Task, runs: list[_Run]) -> Outcome:
     )
 
 
-def _tightened(task: _Task, run: _Run) -> Trajectory | None:
+def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
+    """The exact uniform stretch; with effort, only where limits are exceeded.
+
+    Where it costs more than samples told, limits are lowered and the problem is solved again: a
+    narrow peak between samples need not slow down the whole flight.
+    """
+    limits = task.problem.limits
+    lowered = limits.as_array()
+    best, answer = None, run
+    for _ in range(NARROWINGS):
+        found: Trajectory | None = run.trajectory
+        if task.effort is None or _excess(task, run.trajectory).any():
+            stretched = stretch_to_limits(run.trajectory, limits)
+            found = None if stretched is None else stretched[0]
+        if found is not None and (best is None or found.duration < best.duration):
+            best, answer = found, run
+        missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
+        if task.is_late or not missed:
+            break
+        lowered = _lowered(lowered, np.fmin(_excess(task, run.trajectory), HOPELESS))
+        start = _start_of(run.trajectory, run.pieces, task.problem)
+        run = _run(task, start, GOING_ON, limits=lowered)
+    if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
+        answer = replace(answer, solved=False)
+    return best, answer
+
+
+def _excess(task: _Task, trajectory: Trajectory) -> np.ndarray:
+    """(len(KINDS),) by how much each limit is exceeded, relative; 0 where it is kept or not set."""
+    ratios = np.fmax.reduce(peak_ratios(trajectory, task.problem.limits), axis=0)
+    return np.fmax(ratios - 1.0, 0.0)
+
+
+def _lowered(limits: np.ndarray, excess: np.ndarray) -> np.ndarray:
+    """Limits (len(KINDS),) lowered, or raised where they hold from below, by an excess."""
+    from_below = np.array([kind.name.startswith("least_") for kind in KINDS])
+    return np.where(from_below, limits / (1.0 - excess), limits * (1.0 - excess))
+
+
+def _tightened(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
     """The answer with motion that is fixed, which rules out the stretch: under lower limits."""
-    limits = task.problem.limits.as_array()
-    kept_low = np.array([kind.name.startswith("least_") for kind in KINDS])
-    lowered = limits.copy()
-    trajectory = run.trajectory
+    lowered = task.problem.limits.as_array()
     for _ in range(TIGHTENINGS):
-        worst = np.fmax.reduce(peak_ratios(trajectory, task.problem.limits))
-        excess = np.fmax(worst - 1.0, 0.0)
+        excess = _excess(task, run.trajectory)
         if not excess.any():
-            return trajectory
-        if excess.max() > HOPELESS:
-            return None
-        change = 1.0 - 2.0 * excess - np.where(excess > 0.0, 1e-8, 0.0)
-        lowered = np.where(kept_low, lowered / change, lowered * change)
-        start = _start_of(trajectory, run.pieces, task.problem)
-        trajectory = _run(task, start, WARM, limits=lowered).trajectory
-    return None
+            return run.trajectory, run
+        if not excess.max() < HOPELESS:
+            break
+        lowered = _lowered(lowered, np.where(excess > 0.0, 2.0 * excess + 1e-8, 0.0))
+        start = _start_of(run.trajectory, run.pieces, task.problem)
+        run = _run(task, start, WARM, limits=lowered)
+    return None, run
 
 
 def _status(task: _Task, run: _Run) -> Status:
-    if run.code == interior.SOLVED:
-        return Status.SOLVED
     if task.is_late:
         return Status.TIME_LIMIT
+    if run.solved:
+        return Status.SOLVED
     return Status.ITERATION_LIMIT if run.code == interior.LIMIT else Status.NO_PROGRESS
 
 
@@ -411,8 +472,6 @@ def _given(task: _Task, problem: Problem) -> _Start | None:
         plan = settings.initial
         wanted = settings.pieces
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
-            return None
-        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         moved = problem.waypoints - plan.problem.waypoints
         start = _start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
@@ -446,29 +505,25 @@ def _start_of(
     return _Start(pieces, data, starts, times)
 
 
-def _guess(problem: Problem) -> _Start:
-    """Durations at the limits of speed and jerk, velocities the means of the legs on both sides."""
+def _guess(problem: Problem, ease: float) -> _Start:
+    """Velocities of the spline of least jerk at durations that one can tell beforehand.
+
+    ease: weight of the time that it takes to speed up, beside the time at the limit of speed.
+    """
     degree = problem.spline_class.degree
     left, _ = basis.counts(degree)
     limits, lengths = problem.limits, problem.leg_lengths
-    times = lengths / limits.speed if limits.speed else np.zeros(len(lengths))
-    if limits.jerk:
-        times = times + np.cbrt(lengths / limits.jerk)
-    elif limits.thrust_acceleration:
-        times = times + np.sqrt(lengths / (limits.thrust_acceleration - GRAVITY))
-    elif limits.snap:
-        times = times + (lengths / limits.snap) ** 0.25
-    steps = np.diff(problem.waypoints, axis=0)
-    mean = steps / times[:, None]
-    velocities = np.zeros_like(problem.waypoints)
-    velocities[1:-1] = (mean[:-1] * times[1:, None] + mean[1:] * times[:-1, None]) / (
-        times[1:] + times[:-1]
-    )[:, None]
-    data = np.zeros((len(times), degree, 3))
-    data[:, 0] = steps
-    data[:, 1] = velocities[:-1]
-    data[:, left] = velocities[1:]
-    return _Start(np.ones(len(times), dtype=np.int64), data, np.zeros((len(times), 3)), times)
+    times = lengths / (limits.speed or 1.0)
+    if ease > 0.0 and limits.jerk:
+        times = ease * np.cbrt(lengths / limits.jerk) + (times if limits.speed else 0.0)
+    last = len(times)
+    ends = {index: np.nan_to_num(problem.fixed[index][:2]) for index in (0, last)}
+    spline = SplineTask.of(problem.waypoints, SplineClass.of("jerk"), ends).solve(times)
+    data = np.zeros((last, degree, 3))
+    data[:, 0] = problem.waypoints[1:] - problem.waypoints[:-1]
+    data[:, 1] = spline.coefficients[:, 1]
+    data[:-1, left] = spline.coefficients[1:, 1]
+    return _Start(np.ones(last, dtype=np.int64), data, np.zeros((last, 3)), times)
 
 
 def _history(runs: list[_Run]) -> History:
