@@ -473,6 +473,8 @@ def _given(task: _Task, problem: Problem) -> _Start | None:
         wanted = settings.pieces
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
             return None
+        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
+            return None
         moved = problem.waypoints - plan.problem.waypoints
         start = _start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
         return replace(start, dual=plan.memory)
