@@ -91,8 +91,8 @@ def call_assemble(layout, grid, limited, work, x):
 
 
 @kernel
-def call_lower(layout, grid, limited, work, x):
-    conditions.lower(layout, grid, limited, work, x, 1.0)
+def call_lower(layout, grid, limited, work, x, slowly):
+    conditions.lower(layout, grid, limited, work, x, slowly)
 
 
 def constrain(kind, samples, limits):
@@ -678,13 +678,13 @@ class Case:
         limits[list(kinds)] = LIMITS[list(kinds)]
         self.limited = unknowns.make_limited(limits, effort, GRAVITY)
         self.work = unknowns.make_work(self.layout, self.grid, self.limited)
-        self.work.stiffness[self.layout.steps] = interior.STIFFNESS
         self.rng = np.random.default_rng(seed)
         self.x = random_unknowns(self.layout, seed)
         shape = self.work.limits.shape
         self.work.limits[:] = self.limited.values[:, None] * self.rng.uniform(0.8, 1.0, size=shape)
         self.work.slack[:] = self.rng.uniform(0.1, 1.0, size=shape)
         self.work.dual[:] = self.rng.uniform(0.1, 1.0, size=shape)
+        self.work.stiffness[:] = self.rng.uniform(0.0, 20.0, size=shape[0])
 
     def evaluate(self, x):
         return call_evaluate(self.layout, self.grid, self.limited, self.work, x)
@@ -773,8 +773,7 @@ def test_assembled_matrix_is_the_one_of_the_definition(name):
     samples = case.samples(case.x)
     times = np.exp(case.x[layout.clock])
     expected = np.zeros((case.x.size, case.x.size))
-    stiff = np.where(layout.steps, 1.0 + interior.STIFFNESS, 1.0)
-    expected[layout.clock, layout.clock] = times * stiff
+    expected[layout.clock, layout.clock] = times * (1.0 + work.stiffness)
     for r in range(len(limited.kinds)):
         gradient = np.zeros((*work.values[:, r].shape, case.x.size))
         for p in range(limited.first[r], limited.first[r + 1]):
@@ -818,11 +817,13 @@ def test_effort_is_the_weighed_integral_of_squares(name):
     assert effort == pytest.approx(expected, rel=1e-10)
 
 
-def test_limits_are_lowered_by_what_happens_between_samples():
+@pytest.mark.parametrize("slowly", [1.0, 0.3])
+def test_limits_are_lowered_by_what_happens_between_samples(slowly):
     """At a lowered limit a sample is as near to it as its cell's peak is to the limit itself."""
     case = make_case("all kinds", samples=9)
     case.evaluate(case.x)
-    call_lower(case.layout, case.grid, case.limited, case.work, case.x)
+    before = case.work.limits.copy()
+    call_lower(case.layout, case.grid, case.limited, case.work, case.x, slowly)
     data, starts, times = unknowns.get_data(case.layout, case.x)
     trajectory = trajectory_of(data, starts, times)
     u = (1.0 - np.cos(np.pi * np.arange(9) / 8)) / 2.0
@@ -843,7 +844,8 @@ def test_limits_are_lowered_by_what_happens_between_samples():
                     inner += 1
                 ratio = min(max(there / peak, conditions.DEEPEST), 1.0)
                 wanted = case.limited.values[r] * (1.0 / ratio if kind == 5 else ratio)
-                assert case.work.limits[k, r, q] == pytest.approx(wanted, rel=1e-5)
+                part_way = before[k, r, q] + slowly * (wanted - before[k, r, q])
+                assert case.work.limits[k, r, q] == pytest.approx(part_way, rel=1e-5)
     assert inner > 50
 
 

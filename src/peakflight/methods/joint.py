@@ -61,6 +61,8 @@ FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
 RETRIES = 4
 """Runs from where a run has stalled; a new barrier often gets it going."""
+TIE = 1e-8
+"""Relative difference of durations that is rounding: an exact stretch is closed to 1e-9."""
 FELL_BACK = "joint found nothing faster than peak, whose plan this is"
 
 
@@ -175,7 +177,8 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     if infeasible or (doubtful and task.effort is None):
         other = peak.solve(_without_class(problem), peak.Settings())
         found = other.status is not Status.INFEASIBLE
-        if found and (infeasible or other.trajectory.duration < outcome.trajectory.duration):
+        faster = other.trajectory.duration < (1.0 - TIE) * outcome.trajectory.duration
+        if found and (infeasible or faster):
             status = Status.TIME_LIMIT if task.is_late else Status.NO_PROGRESS
             outcome = replace(other, status=status, message=FELL_BACK)
             complete = _without_class(problem)
@@ -461,6 +464,8 @@ def _given(task: _Task, problem: Problem) -> Start | None:
         if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
+            return None
+        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         moved = problem.waypoints - plan.problem.waypoints
         start = start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
