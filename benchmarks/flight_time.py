@@ -73,7 +73,7 @@ def _known(task: Task) -> Table:
         best = task.known.get(name)
         try:
             problem = task.problem(waypoints)
-            plan = pf.plan(problem)
+            plan = pf.plan(problem, method="peak")
             simple = pf.plan(problem, method="proportional")
         except Exception as error:  # a failure is a row
             rows.append(failure(cells, error, BAR))
@@ -115,8 +115,8 @@ def _long(lengths: Sequence[int]) -> Table:
         cells: dict[str, Cell] = {"course": f"walk of {legs:,}", "legs": legs}
         try:
             problem = JERK.problem(walk(legs))
-            plan = pf.plan(problem)
-            other = pf.plan(problem, settings=peak.Settings(ladder=early))
+            plan = pf.plan(problem, method="peak")
+            other = pf.plan(problem, method="peak", settings=peak.Settings(ladder=early))
         except Exception as error:  # a failure is a row
             rows.append(failure(cells, error, BAR))
             continue
@@ -193,7 +193,7 @@ def _against_reference(task: Task, index: int) -> Row:
     }
     try:
         problem = task.problem(waypoints)
-        plan = pf.plan(problem)
+        plan = pf.plan(problem, method="peak")
     except Exception as error:  # a failure is a row
         return failure(cells, error)
     cells |= {
@@ -230,6 +230,6 @@ def _references(problem: pf.Problem, index: int) -> Iterator[tuple[str, pf.Plan]
         times = start * (lengths.sum() / (problem.limits.speed or 1.0) / start.sum())
         with mock.patch.object(peak, "proportional_times", lambda _, times=times: times.copy()):
             try:
-                yield name, pf.plan(problem, settings=settings)
+                yield name, pf.plan(problem, method="peak", settings=settings)
             except pf.PeakflightError:
                 continue

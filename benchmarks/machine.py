@@ -11,7 +11,7 @@ from pathlib import Path
 
 PACKAGES = (
     "peakflight", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "spline-trajectory",
-    "minsnap-trajectories", "rotorpy", "cvxopt",
+    "minsnap-trajectories", "rotorpy", "cvxopt", "toppra", "drake",
 )  # fmt: skip
 
 

@@ -158,7 +158,7 @@ def _replayed(course: _Course, problem: pf.Problem, rounds: int, shares: list[Ro
     called: list[float] = []
 
     def call() -> None:
-        plans[:] = [pf.plan(problem)]
+        plans[:] = [pf.plan(problem, method="peak")]
 
     def spied(count: int) -> None:
         runs = (recorded(call, warm=False) for _ in range(count))
@@ -185,7 +185,7 @@ def _as_called(course: _Course, problem: pf.Problem, rounds: int) -> list[Row]:
     plans: list[pf.Plan] = []
 
     def call() -> None:
-        plans[:] = [pf.plan(problem)]
+        plans[:] = [pf.plan(problem, method="peak")]
 
     runs: list[list[Call]] = []
     while len(runs) < rounds and sum(part.seconds for run in runs for part in run) < 10.0:

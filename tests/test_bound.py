@@ -110,7 +110,11 @@ class TestAgainstWhatIsKnown:
         found = pf.discretised_bound(problem)
         for degree, minimize in ((5, "jerk"), (7, "snap")):
             plan = pf.plan(
-                problem.waypoints, limits=problem.limits, degree=degree, minimize=minimize
+                problem.waypoints,
+                method="peak",
+                limits=problem.limits,
+                degree=degree,
+                minimize=minimize,
             )
             assert found.excess(plan.duration) > 5.0
 

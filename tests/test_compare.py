@@ -24,7 +24,7 @@ from peakflight.compare import (
     summarise,
     warm_up,
 )
-from peakflight.methods import METHODS
+from peakflight.methods import METHODS, proportional
 
 Run = Callable[..., Result]
 
@@ -42,7 +42,9 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], str]:
         def solve(*_: Any) -> None:
             raise error
 
-        module = SimpleNamespace(Settings=SimpleNamespace, solve=solve)
+        module = SimpleNamespace(
+            Settings=proportional.Settings, kernels=proportional.kernels, solve=solve
+        )
         monkeypatch.setitem(METHODS, "broken", "fails")
         monkeypatch.setitem(sys.modules, "peakflight.methods.broken", module)
         return "broken"
@@ -344,7 +346,7 @@ class TestCommand:
         assert result.stdout.count("\n") == 1
         values = json.loads(result.stdout)
         assert values["limits"] == {"speed": 3.0, "tilt": pytest.approx(np.radians(40.0))}
-        assert (values["minimize"], values["degree"]) == ("snap", 7)
+        assert (values["minimize"], values["degree"]) == ("snap", None)
         (course,) = values["courses"]
         assert (course["course"], course["file"], course["legs"]) == ("lap", "lap.csv", 4)
         assert [row["method"] for row in course["rows"]] == list(METHODS)
