@@ -368,12 +368,13 @@ def lower(layout, grid, limited, work, x, slowly):
     cells = grid.dense.shape[2] // count
     data = np.empty((grid.orders.size, 3))
     near = np.empty((3, 4, count * cells))
+    rates = np.empty((3, 4, count * cells))
     around = np.empty(count * cells)
     there = np.empty(count)
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
         pieces.end_data(layout.place, layout.known, x, k, data)
-        pieces.derivatives(data, grid.orders, time, limited.gravity[0], grid.dense, near)
+        pieces.sample(data, grid.orders, time, limited.gravity[0], grid.dense, near, rates)
         for r in range(limited.kinds.size):
             kind, limit = limited.kinds[r], limited.values[r]
             rows.kappa(

@@ -67,27 +67,6 @@ def sample(data, orders, time, gravity, table, samples, rates):
 
 
 @vector
-def derivatives(data, orders, time, gravity, table, samples):
-    """Samples (3, 4, S) <- derivatives of a piece, without their slopes."""
-    flat = table.reshape(table.shape[0], -1)
-    values = samples.reshape(3, -1)
-    for d in range(3):
-        for q in range(flat.shape[1]):
-            values[d, q] = 0.0
-        for r in range(flat.shape[0]):
-            scaled = data[r, d] * time ** orders[r]
-            for q in range(flat.shape[1]):
-                values[d, q] += flat[r, q] * scaled
-        scale = 1.0
-        for s in range(4):
-            scale /= time
-            for q in range(table.shape[2]):
-                samples[d, s, q] *= scale
-    for q in range(table.shape[2]):
-        samples[2, 1, q] += gravity
-
-
-@vector
 def push(pulls, rates, orders, time, table, out):
     """Out (N, 3) <- pulls (3, 4, S) on the samples, carried to the end data.
 
