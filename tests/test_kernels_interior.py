@@ -6,7 +6,7 @@ Everything that calls a kernel by hand stands first, in a few helpers.
 import numpy as np
 import pytest
 
-from peakflight.kernels import band, basis, interior, pieces, rows, unknowns
+from peakflight.kernels import band, basis, conditions, interior, pieces, rows, unknowns
 from peakflight.kernels.jit import kernel
 from peakflight.limits import GRAVITY, KINDS, limited_values
 from peakflight.spline import coefficients_of
@@ -76,23 +76,23 @@ def call_band(matrix, damping, factor, values):
 
 @kernel
 def call_evaluate(layout, grid, limited, work, x):
-    return interior._evaluate(layout, grid, limited, work, x)
+    return conditions.evaluate(layout, grid, limited, work, x)
 
 
 @kernel
 def call_linear(layout, grid, limited, work, x, pulls, gradient, step, moves):
-    interior._gradient(layout, grid, limited, work, x, pulls, gradient)
-    interior._product(layout, grid, limited, work, x, step, moves)
+    conditions.gradient(layout, grid, limited, work, x, pulls, gradient)
+    conditions.product(layout, grid, limited, work, x, step, moves)
 
 
 @kernel
 def call_assemble(layout, grid, limited, work, x):
-    interior._assemble(layout, grid, limited, work, x)
+    conditions.assemble(layout, grid, limited, work, x)
 
 
 @kernel
 def call_lower(layout, grid, limited, work, x):
-    interior._lower(layout, grid, limited, work, x)
+    conditions.lower(layout, grid, limited, work, x, 1.0)
 
 
 def constrain(kind, samples, limits):
@@ -678,6 +678,7 @@ class Case:
         limits[list(kinds)] = LIMITS[list(kinds)]
         self.limited = unknowns.make_limited(limits, effort, GRAVITY)
         self.work = unknowns.make_work(self.layout, self.grid, self.limited)
+        self.work.stiffness[self.layout.steps] = interior.STIFFNESS
         self.rng = np.random.default_rng(seed)
         self.x = random_unknowns(self.layout, seed)
         shape = self.work.limits.shape
@@ -840,7 +841,7 @@ def test_limits_are_lowered_by_what_happens_between_samples():
                     fit = np.polynomial.Polynomial.fit([-1, 0, 1], around[top - 1 : top + 2], 2)
                     peak = fit(fit.deriv().roots()[0])
                     inner += 1
-                ratio = min(max(there / peak, interior.DEEPEST), 1.0)
+                ratio = min(max(there / peak, conditions.DEEPEST), 1.0)
                 wanted = case.limited.values[r] * (1.0 / ratio if kind == 5 else ratio)
                 assert case.work.limits[k, r, q] == pytest.approx(wanted, rel=1e-5)
     assert inner > 50
@@ -849,7 +850,9 @@ def test_limits_are_lowered_by_what_happens_between_samples():
 def test_a_solved_run_is_optimal_to_first_order():
     """Stationary, feasible, complementary, by finite differences."""
     case = make_case("norms and thrust, degree 5", samples=12)
-    begin = interior.Begin(margin=1.05, barrier=0.3, slack=1e-3, kept=0.0)
+    begin = interior.Begin(
+        margin=1.05, barrier=0.3, slack=1e-3, stiffness=0.0, slowly=1.0, kept=0.0
+    )
     case.work.x[:] = case.x
     code = interior.run(
         case.layout, case.grid, case.limited, case.work, True, begin, 1e-5, 150

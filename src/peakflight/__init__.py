@@ -21,6 +21,7 @@ from peakflight.trajectory import Trajectory
 from peakflight.version import __version__
 
 if TYPE_CHECKING:
+    from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.planner import plan, replan
     from peakflight.spline import minimum_effort_spline
@@ -43,6 +44,7 @@ __all__ = [
     "__version__",
     "certify",
     "certify_plan",
+    "discretised_bound",
     "minimum_effort_spline",
     "plan",
     "read_course",
@@ -54,6 +56,7 @@ __all__ = [
 _LAZY = {
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
+    "discretised_bound": "peakflight.bound",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
     "replan": "peakflight.planner",

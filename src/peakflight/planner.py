@@ -131,6 +131,8 @@ def replan(
         changes["limits"] = limits
     if "initial" in _fields(methods.find(last.method).Settings):
         options.setdefault("initial", last)
+        if len(set(last.pieces)) == 1 and "max_pieces" not in options:
+            options.setdefault("pieces", last.pieces[0])
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 

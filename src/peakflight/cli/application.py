@@ -23,6 +23,7 @@ import click
 
 import peakflight
 from peakflight.cli.check import check
+from peakflight.cli.compare import compare
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
 from peakflight.cli.output import print_json
 from peakflight.cli.plan import plan
@@ -100,6 +101,7 @@ def application(context: click.Context) -> int:
 
 application.add_command(plan)
 application.add_command(check)
+application.add_command(compare)
 
 
 def _report(error: Exception, arguments: Sequence[str]) -> int:

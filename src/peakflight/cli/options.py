@@ -69,6 +69,25 @@ def limits_option(help: str, default: Limits | None = None) -> Callable[[_Comman
     )
 
 
+def spline_options(command: _Command) -> _Command:
+    """Options that choose the class of spline."""
+    for decorate in (
+        click.option("--continuity", type=int, help="Highest derivative that is continuous."),
+        click.option(
+            "--degree", type=int, help="Degree of the polynomials; by default the method's own."
+        ),
+        click.option(
+            "--minimize",
+            type=click.Choice(("jerk", "snap", "acceleration")),
+            default="jerk",
+            show_default=True,
+            help="Derivative whose square a spline minimizes, and which effort weighs.",
+        ),
+    ):
+        command = decorate(command)
+    return command
+
+
 def common_options(command: _Command) -> _Command:
     """Options that every command has."""
     for decorate in (

@@ -6,14 +6,14 @@ from typing import Any
 
 import click
 
+from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option
+from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
-from peakflight.course import Course, tidy
-from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
-from peakflight.formats import FLIGHT_WRITERS, read_course
+from peakflight.errors import InvalidProblem, MissingExtra
+from peakflight.formats import FLIGHT_WRITERS
 from peakflight.limits import Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
@@ -80,15 +80,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
     "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
-@click.option(
-    "--minimize",
-    type=click.Choice(("jerk", "snap", "acceleration")),
-    default="jerk",
-    show_default=True,
-    help="Derivative whose square a spline minimizes, and which --effort weighs.",
-)
-@click.option("--degree", type=int, help="Degree of the polynomials; by default the method's own.")
-@click.option("--continuity", type=int, help="Highest derivative that is continuous.")
+@spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option(
     "--export",
@@ -144,7 +136,7 @@ def plan(
     method = _method(method, tuning)
     with Progress() as progress:
         progress.stage("reading the course")
-        read, notes = _read(course, strict)
+        read, notes = read_tidied(course, strict=strict)
         problem = Problem(
             read.waypoints,
             limits=limits or PAPER_LIMITS,
@@ -168,7 +160,7 @@ def plan(
                 drawn, why_not = _draw(answer, folder)
                 files, more = {**files, **drawn}, (*more, *why_not)
         if read.times is not None:
-            notes = (*notes, "the times in the course are not used: the planner finds its own")
+            notes = (*notes, UNUSED_TIMES)
         stale = _stale(folder, files)
         if stale:
             more = (*more, f"from an earlier run in this folder: {', '.join(stale)}")
@@ -191,14 +183,6 @@ def plan(
     if not answer.feasible:
         click.echo(f"peakflight: no feasible trajectory ({answer.status})", err=True)
     return 0 if answer.feasible else 1
-
-
-def _read(path: Path, strict: bool) -> tuple[Course, tuple[str, ...]]:
-    course = read_course(path)
-    try:
-        return tidy(course, strict=strict)
-    except InvalidProblem as error:
-        raise InvalidFile(f"{path}: {error}") from None
 
 
 def _method(method: str | None, tuning: dict[str, Any]) -> str:

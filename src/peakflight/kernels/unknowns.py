@@ -1,4 +1,4 @@
-"""Where the unknowns of `interior` stand, and the tables that it works with."""
+"""Where the unknowns of `interior` stand, and the tables and arrays that it works with."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from peakflight.kernels import basis
-from peakflight.kernels.interior import MARKS, Grid, Layout, Limited, Work
+from peakflight.kernels.conditions import Grid, Layout, Limited, Work
+from peakflight.kernels.interior import MARKS
 from peakflight.kernels.rows import KIND_TERMS
 
 CELL = 5
@@ -193,6 +194,6 @@ def make_work(layout: Layout, grid: Grid, limited: Limited) -> Work:
         dual=np.zeros(rows),
         matrix=np.empty((unknowns, width)),
         factor=np.empty((unknowns, width)),
-        stiffness=np.empty(pieces),
+        stiffness=np.zeros(pieces),
         marks=np.zeros(MARKS),
     )

@@ -15,13 +15,15 @@ import numpy as np
 from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
-from peakflight.kernels.interior import Begin, Layout
+from peakflight.kernels.conditions import Layout
+from peakflight.kernels.interior import Begin
 from peakflight.limits import GRAVITY, KINDS
 from peakflight.methods import Outcome, peak, proportional, require, require_whole
 from peakflight.methods.idle import idle_times, parts_for
-from peakflight.problem import DEGREES, Problem, SplineClass, derivative_name
+from peakflight.methods.start import Start, guess, start_of
+from peakflight.problem import DEGREES, Problem, derivative_name
 from peakflight.result import History, Plan
-from peakflight.spline import SplineTask, coefficients_of
+from peakflight.spline import coefficients_of
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
 DEGREE = 7
@@ -122,22 +124,6 @@ class _Task:
     @property
     def is_late(self) -> bool:
         return time.perf_counter() >= self.deadline
-
-
-@dataclass(frozen=True, eq=False)
-class _Start:
-    """A motion to begin from: what `unknowns.set_unknowns` takes."""
-
-    pieces: np.ndarray
-    """(legs,)."""
-    data: np.ndarray
-    """(K, N, 3) end data by time."""
-    starts: np.ndarray
-    """(K, 3) m, where pieces begin, from the first waypoint of their leg."""
-    times: np.ndarray
-    """(K,) s."""
-    dual: np.ndarray | None = None
-    """Multipliers of a similar problem, if they are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,13 +243,14 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
     start, begin = _given(task, problem), FRESH
     cuts = settings.pieces != 1
     if start is None:
-        start = _guess(task.problem, EASE_OF_MANY if cuts else EASE)
+        start = guess(task.problem, EASE_OF_MANY if cuts else EASE)
     elif isinstance(settings.initial, Plan):
-        begin, cuts = WARM, False
+        begin = WARM
+        cuts = cuts and not (start.pieces > 1).any()
     runs = [_run(task, start, begin, ROUGH if cuts else settings.tolerance)]
     if cuts and not runs[0].ended:
         runs.append(
-            _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
+            _run(task, start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
         )
     for _ in range(ROUNDS if cuts else 0):
         last = runs[-1]
@@ -273,18 +260,18 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         trajectory = last.trajectory.subdivide(parts)
         leg = np.repeat(np.arange(len(last.pieces)), last.pieces)
         pieces = np.bincount(leg, weights=parts).astype(np.int64)
-        runs.append(_run(task, _start_of(trajectory, pieces, task.problem), GOING_ON))
+        runs.append(_run(task, start_of(trajectory, pieces, task.problem), GOING_ON))
         if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
     if not runs[-1].solved and runs[-1].ended:  # nothing to cut: only a rough run so far
         runs.append(
-            _run(task, _start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
+            _run(task, start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
         )
     for _ in range(RETRIES):
         last = runs[-1]
         if last.solved or task.is_late:
             break
-        runs.append(_run(task, _start_of(last.trajectory, last.pieces, task.problem), AGAIN))
+        runs.append(_run(task, start_of(last.trajectory, last.pieces, task.problem), AGAIN))
     return runs
 
 
@@ -307,7 +294,7 @@ def _parts(task: _Task, run: _Run) -> np.ndarray:
 
 def _run(
     task: _Task,
-    start: _Start,
+    start: Start,
     begin: Begin,
     tolerance: float | None = None,
     limits: np.ndarray | None = None,
@@ -422,7 +409,7 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         if task.is_late or not missed:
             break
         lowered = _lowered(lowered, np.fmin(_excess(task, run.trajectory), HOPELESS))
-        start = _start_of(run.trajectory, run.pieces, task.problem)
+        start = start_of(run.trajectory, run.pieces, task.problem)
         run = _run(task, start, GOING_ON, limits=lowered)
     if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
         answer = replace(answer, solved=False)
@@ -451,7 +438,7 @@ def _tightened(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         if not excess.max() < HOPELESS:
             break
         lowered = _lowered(lowered, np.where(excess > 0.0, 2.0 * excess + 1e-8, 0.0))
-        start = _start_of(run.trajectory, run.pieces, task.problem)
+        start = start_of(run.trajectory, run.pieces, task.problem)
         run = _run(task, start, WARM, limits=lowered)
     return None, run
 
@@ -464,66 +451,25 @@ def _status(task: _Task, run: _Run) -> Status:
     return Status.ITERATION_LIMIT if run.code == interior.LIMIT else Status.NO_PROGRESS
 
 
-def _given(task: _Task, problem: Problem) -> _Start | None:
+def _given(task: _Task, problem: Problem) -> Start | None:
     """The start that the settings name; None for a guess, also where a plan does not fit."""
     settings = task.settings
     legs = len(problem.waypoints) - 1
     if isinstance(settings.initial, Plan):
         plan = settings.initial
         wanted = settings.pieces
+        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
+            return None
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
             return None
         moved = problem.waypoints - plan.problem.waypoints
-        start = _start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
+        start = start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
         return replace(start, dual=plan.memory)
     if settings.initial == "guess":
         return None
     method = peak if settings.initial == "peak" else proportional
     found = method.solve(_without_class(problem), method.Settings())
-    return _start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
-
-
-def _start_of(
-    trajectory: Trajectory, pieces: np.ndarray, problem: Problem, moved: np.ndarray | None = None
-) -> _Start:
-    """A trajectory as a start; waypoints that moved, by (legs+1, 3) m, take joints with them."""
-    degree = problem.spline_class.degree
-    times = trajectory.segment_times
-    powers = times[:, None] ** np.arange(trajectory.degree + 1.0)
-    orders = basis.row_orders(degree)[:-1]
-    scaled = trajectory.coefficients * powers[:, :, None]
-    data = basis.from_monomials(degree, trajectory.degree) @ scaled
-    data /= times[:, None, None] ** orders[:, None]
-    leg = np.repeat(np.arange(len(pieces)), pieces)
-    firsts = np.cumsum(pieces) - pieces
-    begins = trajectory.coefficients[:, 0]
-    starts = begins - begins[firsts][leg]
-    if moved is not None:
-        longer = ((moved[1:] - moved[:-1]) / pieces[:, None])[leg]
-        data[:, 0] += longer
-        starts += (np.arange(len(times)) - firsts[leg])[:, None] * longer
-    return _Start(pieces, data, starts, times)
-
-
-def _guess(problem: Problem, ease: float) -> _Start:
-    """Velocities of the spline of least jerk at durations that one can tell beforehand.
-
-    ease: weight of the time that it takes to speed up, beside the time at the limit of speed.
-    """
-    degree = problem.spline_class.degree
-    left, _ = basis.counts(degree)
-    limits, lengths = problem.limits, problem.leg_lengths
-    times = lengths / (limits.speed or 1.0)
-    if ease > 0.0 and limits.jerk:
-        times = ease * np.cbrt(lengths / limits.jerk) + (times if limits.speed else 0.0)
-    last = len(times)
-    ends = {index: np.nan_to_num(problem.fixed[index][:2]) for index in (0, last)}
-    spline = SplineTask.of(problem.waypoints, SplineClass.of("jerk"), ends).solve(times)
-    data = np.zeros((last, degree, 3))
-    data[:, 0] = problem.waypoints[1:] - problem.waypoints[:-1]
-    data[:, 1] = spline.coefficients[:, 1]
-    data[:-1, left] = spline.coefficients[1:, 1]
-    return _Start(np.ones(last, dtype=np.int64), data, np.zeros((last, 3)), times)
+    return start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
 
 
 def _history(runs: list[_Run]) -> History:
