@@ -64,7 +64,7 @@ def _run(scope: Scope, names: Sequence[str], output: Path) -> int:
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     size = parser.add_mutually_exclusive_group()
-    size.add_argument("--quick", action="store_true", help="under a minute: does it all run?")
+    size.add_argument("--quick", action="store_true", help="few of each: does it all run?")
     size.add_argument("--full", action="store_true", help="also peak at 100,000 legs")
     parser.add_argument(
         "--only", action="append", choices=SUITES, help="one suite; may be repeated"
