@@ -45,7 +45,7 @@ CHUNK = 4
 """Iterations between looks at the clock, if there is a time limit."""
 TIGHTENINGS = 8
 """Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
-NARROWINGS, NARROW = 4, 5e-4
+NARROWINGS, NARROW = 4, 2e-3
 """Rounds of the same, where peaks between samples would cost more than this part of the time."""
 HOPELESS = 0.2
 """Excess over a limit that lowering limits is not tried for."""
@@ -53,7 +53,7 @@ ROUNDS = 3
 """Most rounds of cutting legs."""
 ENOUGH = 1.3
 """Times the allowance of idle time; a cut for less is not worth its iterations."""
-EASE, EASE_OF_MANY = 0.5, 0.0
+EASE, EASE_OF_MANY = 1.0, 0.0
 """Of the guess, for whole legs and where legs are cut: which of them ends better was measured."""
 GAIN_OF_CUT = 1e-3
 """Relative gain of a cut below which legs are not cut again."""
