@@ -102,7 +102,7 @@ class Limits:
         if not self.active:
             raise InvalidProblem("no limit is set; set at least one, such as speed=5.0")
 
-    @property
+    @cached_property
     def active(self) -> tuple[LimitKind, ...]:
         """The kinds that are set, in the order of `KINDS`."""
         return tuple(kind for kind in KINDS if getattr(self, kind.name) is not None)

@@ -55,7 +55,9 @@ def plan(
     """
     began = time.perf_counter()
     module = methods.find(method)
-    tuning = {name: options.pop(name) for name in _fields(module.Settings) & set(options)}
+    tuning = {}
+    if options:
+        tuning = {name: options.pop(name) for name in _fields(module.Settings) & set(options)}
     notes: tuple[str, ...] = ()
     if not isinstance(problem, Problem):
         problem, notes = _tidied(problem, limits, options)
