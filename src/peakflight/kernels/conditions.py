@@ -15,6 +15,8 @@ from peakflight.kernels.jit import inner, within
 
 LEAST = 5
 """The kind that is limited from below."""
+LOST = 8
+"""Where `evaluate` leaves a mark; the others are those of `interior`."""
 DEEPEST = 0.5
 """No limit is lowered below this part of itself."""
 
@@ -118,10 +120,14 @@ class Work(NamedTuple):
 
 @inner
 def evaluate(layout, grid, limited, work, x):
-    """Samples and constraints at x; returns the stretch that they need, total time and effort."""
+    """Samples and constraints at x; returns the stretch that they need, total time and effort.
+
+    work.marks[LOST] <- the time that pieces would lose if each were stretched for itself.
+    """
     count = grid.table.shape[2]
     data = np.empty((grid.orders.size, 3))
     needed = limited.least[0]
+    lost = 0.0
     total = 0.0
     effort = 0.0
     for k in range(layout.clock.size):
@@ -131,16 +137,20 @@ def evaluate(layout, grid, limited, work, x):
         pieces.sample(
             data, grid.orders, time, limited.gravity[0], grid.table, work.samples[k], work.rates[k]
         )
+        own = limited.least[0]
         for r in range(limited.kinds.size):
-            needed = max(
-                needed,
+            own = max(
+                own,
                 rows.constrain(
                     limited.kinds[r], limited.turning, work.samples[k], count, work.limits[k, r],
                     limited.gravity[0], work.values[k, r], limited.first[r], work.slopes[k],
                     work.bends[k],
                 ),
             )  # fmt: skip
+        needed = max(needed, own)
+        lost += time * max(own - 1.0, 0.0)
         effort += _effort(limited.effort, grid, limited, work.samples[k], time)
+    work.marks[LOST] = lost
     return needed, total, effort
 
 

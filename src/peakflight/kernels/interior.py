@@ -30,6 +30,9 @@ TO_BOUNDARY = 0.995
 """Part of the way to the nearest bound that a step may go."""
 FLOOR = 0.03
 """mu is kept above this part of the time that the iterate would lose by stretching."""
+LOCALLY = 10.0
+"""Where legs are whole, mu is kept for no more than this times what the pieces would lose if each
+were stretched for itself: one bad leg of a thousand need not hold up the others."""
 TOLERATED = 1.02
 """Growth of stretched time and of the residual above which a step is halved, if both do."""
 HALVINGS = 2
@@ -56,10 +59,10 @@ SOLVED, LIMIT, STALLED = 0, 1, 2
 
 
 GAP, LOWERED, BEST, STRETCH, REFERENCE, LAST, COUNT, DECREMENT = range(8)
-MARKS = 8
+MARKS = 9
 """Marks: complementarity gap over time; whether limits were lowered; the least stretched objective
 and the stretch of its iterate; objective and iteration of the last gain; iterations; half the
-squared Newton decrement over time: what the next step promises."""
+squared Newton decrement over time: what the next step promises; and `conditions.LOST`."""
 
 
 class Begin(NamedTuple):
@@ -100,6 +103,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
     trial = np.empty_like(x)
     step = np.empty_like(x)
     count = values.size
+    whole = not layout.steps.any()
     needed, time, effort = conditions.evaluate(layout, grid, limited, work, x)
     objective = time * needed + effort
     for _ in range(iterations):
@@ -117,6 +121,8 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
                 affine = _product_after(slack, dual, slack_step, dual_step, primal, along)
                 centring = min(1.0, max((affine / complementarity) ** 3, 1e-3))
                 behind = min(1.0, max(objective / (time + effort) - 1.0, 0.0))
+                if whole:
+                    behind = min(behind, LOCALLY * marks[conditions.LOST] / time)
                 mu = max(centring * complementarity, max(1e-9, FLOOR * behind) * time) / count
                 _correct(slack, dual, slack_step, dual_step, residual, mu, pulls)
             conditions.gradient(layout, grid, limited, work, x, pulls, step)
