@@ -190,7 +190,7 @@ class Trajectory:
         times = np.append(self.segment_times[:index], local)
         left = type(self)(left.coefficients, times, self.start_time)
         coefficients = self.coefficients[index:].copy()
-        coefficients[0] = _shift_origin(coefficients[0], local)
+        coefficients[:1] = _shift_origin(coefficients[:1], np.array([local]))
         times = self.segment_times[index:].copy()
         times[0] -= local
         return left, type(self)(coefficients, times, float(t))
@@ -210,11 +210,7 @@ class Trajectory:
         first = np.cumsum(counts) - counts
         times = (self.segment_times / counts)[parent]
         offset = (np.arange(len(parent)) - first[parent]) * times
-        coefficients = np.zeros((len(parent), *self.coefficients.shape[1:]))
-        for j in range(self.degree + 1):  # Taylor shift
-            for i in range(j, self.degree + 1):
-                shift = comb(i, j) * offset ** (i - j)
-                coefficients[:, j] += shift[:, None] * self.coefficients[parent, i]
+        coefficients = _shift_origin(self.coefficients[parent], offset)
         return type(self)(coefficients, times, self.start_time)
 
     def join(self, other: Self) -> Self:
@@ -244,11 +240,8 @@ class Trajectory:
     def reverse(self) -> Self:
         """The same path flown backwards, in the same interval of time."""
         signs = (-1.0) ** np.arange(self.degree + 1)
-        flipped = [
-            _shift_origin(piece, time) * signs[:, None]
-            for piece, time in zip(self.coefficients, self.segment_times, strict=True)
-        ]
-        return type(self)(np.array(flipped[::-1]), self.segment_times[::-1], self.start_time)
+        flipped = _shift_origin(self.coefficients, self.segment_times) * signs[:, None]
+        return type(self)(flipped[::-1], self.segment_times[::-1], self.start_time)
 
     def stretch(self, factor: float) -> Self:
         """The same path flown slower by `factor` (faster below 1), from the same start time."""
@@ -307,13 +300,9 @@ class Trajectory:
         )
 
 
-def _shift_origin(coefficients: np.ndarray, offset: float) -> np.ndarray:
-    """Coefficients (N+1, D) of the same polynomial around another origin (Taylor shift)."""
-    count = len(coefficients)
-    matrix = np.array(
-        [
-            [comb(j, i) * offset ** (j - i) if j >= i else 0.0 for j in range(count)]
-            for i in range(count)
-        ]
-    )
-    return matrix @ coefficients
+def _shift_origin(coefficients: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """Coefficients (K, N+1, D) of the same polynomials around other origins (K,) (Taylor shift)."""
+    powers = range(coefficients.shape[1])
+    ways = np.array([[float(comb(j, i)) for j in powers] for i in powers])
+    exponents = np.array([[max(j - i, 0) for j in powers] for i in powers])
+    return (ways * offset[:, None, None] ** exponents) @ coefficients

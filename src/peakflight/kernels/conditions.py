@@ -113,9 +113,9 @@ class Work(NamedTuple):
     factor: np.ndarray
     """(n, w)."""
     stiffness: np.ndarray
-    """(K,) of parts of legs, see `STIFFNESS`; 0 for whole legs."""
+    """(K,) see `interior.STIFFNESS`; 0 for pieces that are not stiffened."""
     marks: np.ndarray
-    """(8,): see the constants below."""
+    """(9,) see `interior.MARKS`."""
 
 
 @inner

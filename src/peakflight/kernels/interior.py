@@ -41,8 +41,9 @@ NEARNESS = 5e-3
 PATIENCE = 15
 """Iterations without gain after which a run ends: as solved if only the stretch is in the way, of
 the best iterate up to ten times the tolerance; else as stalled."""
-STRETCHES = 4
-"""Stretches of a start; one does, save for kinds whose stretch is an estimate."""
+STRETCHES, EXACT = 3, 1e-9
+"""Most stretches of a start, and how close they come; one does, save for kinds whose stretch is an
+estimate."""
 STIFFNESS, STIFFEST = 10.0, 1e4
 """What the matrix has more than the objective's own curvature in the logarithms of the durations of
 parts of a leg, at least and at most: where a leg is cut matters little, and steps along it would be
@@ -196,15 +197,16 @@ def _begin(layout, grid, limited, work, begin):
             for q in range(work.limits.shape[2]):
                 work.limits[k, r, q] = limited.values[r]
     needed, time, effort = 0.0, 0.0, 0.0
-    for attempt in range(STRETCHES):
+    for attempt in range(STRETCHES + 1):
         needed, time, effort = conditions.evaluate(layout, grid, limited, work, work.x)
-        if begin.margin > 0.0 and attempt < STRETCHES - 1:
-            factor = max(needed * begin.margin, 1e-3)
-            for i in range(work.x.size):
-                if layout.order[i] < 0:
-                    work.x[i] += np.log(factor)
-                else:
-                    work.x[i] /= factor ** layout.order[i]
+        factor = max(needed * begin.margin, 1e-3)
+        if begin.margin == 0.0 or attempt == STRETCHES or abs(factor - 1.0) < EXACT:
+            break
+        for i in range(work.x.size):
+            if layout.order[i] < 0:
+                work.x[i] += np.log(factor)
+            else:
+                work.x[i] /= factor ** layout.order[i]
     values = work.values.reshape(-1)
     slack = work.slack.reshape(-1)
     dual = work.dual.reshape(-1)
@@ -228,7 +230,7 @@ def _begin(layout, grid, limited, work, begin):
 
 @inner
 def _stiffen(layout, work, residual, slack_step, primal):
-    """Stiffen parts of legs whose constraints do not go where the step was to lead them.
+    """Stiffen pieces whose constraints do not go where the step was to lead them; loosen others.
 
     Snap in a short piece changes with the fourth power of its duration: there the linear picture
     that a step is made with fails first, and steps that are too long would fail again and again.

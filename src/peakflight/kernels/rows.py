@@ -203,6 +203,34 @@ def _least_thrust_kappa(samples, count, limit, out):
         out[q] = limit / np.sqrt(x * x + y * y + z * z + TINY)
 
 
+@inner
+def _turn_of(samples, q, gravity):
+    """|F|^2, never quite zero, F.j / F.F and F.s / F.F of a sample."""
+    square = WEIGHTLESS * gravity * gravity
+    along = 0.0
+    further = 0.0
+    for x in range(3):
+        square += samples[x, 1, q] * samples[x, 1, q]
+        along += samples[x, 1, q] * samples[x, 2, q]
+        further += samples[x, 1, q] * samples[x, 3, q]
+    return square, along / square, further / square
+
+
+@inner
+def _across(samples, x, q, turn, pull):
+    """One axis of j and of s - 2 r j, both across F, with r and F.s / F.F of `_turn_of`."""
+    across = samples[x, 2, q] - turn * samples[x, 1, q]
+    return across, samples[x, 3, q] - pull * samples[x, 1, q] - 2.0 * turn * across
+
+
+@inner
+def _rooted(ratio):
+    """Square root of a squared ratio, by its tangent below BENT; and its slope."""
+    above = max(ratio, BENT)
+    steep = 0.5 / np.sqrt(above)
+    return steep * (above + ratio), steep
+
+
 @vector
 def _body_rate(samples, count, limits, gravity, values, first, slopes, bends):
     """|j across F| / (|F| L) - 1: how fast the thrust direction turns, against its limit."""
@@ -210,26 +238,21 @@ def _body_rate(samples, count, limits, gravity, values, first, slopes, bends):
     by_jerk = slopes[first + 1]
     worst = 0.0
     for q in range(count):
-        square = WEIGHTLESS * gravity * gravity
-        along = 0.0
-        for x in range(3):
-            square += samples[x, 1, q] * samples[x, 1, q]
-            along += samples[x, 1, q] * samples[x, 2, q]
-        turn = along / square  # F.j / F.F
+        square, turn, pull = _turn_of(samples, q, gravity)
         size = 0.0
         for x in range(3):
-            across = samples[x, 2, q] - turn * samples[x, 1, q]
+            across, _ = _across(samples, x, q, turn, pull)
             size += across * across
-        ratio = size / (square * limits[q] * limits[q])
-        worst = max(worst, ratio)
-        steep = 0.5 / np.sqrt(max(ratio, BENT))
-        values[q] = 2.0 * steep * max(ratio, BENT) + steep * (ratio - max(ratio, BENT)) - 1.0
-        unit = 2.0 * steep / (square * limits[q] * limits[q])
+        scale = 1.0 / (square * limits[q] * limits[q])
+        worst = max(worst, size * scale)
+        root, steep = _rooted(size * scale)
+        values[q] = root - 1.0
+        unit = 2.0 * steep * scale
         for x in range(3):
-            across = samples[x, 2, q] - turn * samples[x, 1, q]
+            across, _ = _across(samples, x, q, turn, pull)
             by_thrust[x, q] = -unit * (turn * across + size / square * samples[x, 1, q])
             by_jerk[x, q] = unit * across
-        bends[first, q] = 2.0 * steep * ratio / square
+        bends[first, q] = unit * size / square
         bends[first + 1, q] = unit
     return worst ** (1.0 / 6.0)
 
@@ -237,14 +260,12 @@ def _body_rate(samples, count, limits, gravity, values, first, slopes, bends):
 @vector
 def _body_rate_kappa(samples, count, limit, gravity, out):
     for q in range(count):
-        square = WEIGHTLESS * gravity * gravity
-        along = 0.0
-        jerk = 0.0
+        square, turn, pull = _turn_of(samples, q, gravity)
+        size = 0.0
         for x in range(3):
-            square += samples[x, 1, q] * samples[x, 1, q]
-            along += samples[x, 1, q] * samples[x, 2, q]
-            jerk += samples[x, 2, q] * samples[x, 2, q]
-        out[q] = np.sqrt(max(jerk - along * along / square, 0.0) / square) / limit
+            across, _ = _across(samples, x, q, turn, pull)
+            size += across * across
+        out[q] = np.sqrt(size / square) / limit
 
 
 @vector
@@ -255,33 +276,23 @@ def _angular_acceleration(samples, count, limits, gravity, values, first, slopes
     by_snap = slopes[first + 2]
     worst = 0.0
     for q in range(count):
-        square = WEIGHTLESS * gravity * gravity
-        along = 0.0
-        snap = 0.0
-        for x in range(3):
-            square += samples[x, 1, q] * samples[x, 1, q]
-            along += samples[x, 1, q] * samples[x, 2, q]
-            snap += samples[x, 1, q] * samples[x, 3, q]
-        turn = along / square  # F.j / F.F
-        pull = snap / square  # F.s / F.F
+        square, turn, pull = _turn_of(samples, q, gravity)
         size = 0.0
         product = 0.0
         rate = 0.0
         for x in range(3):
-            across = samples[x, 2, q] - turn * samples[x, 1, q]
-            swing = samples[x, 3, q] - pull * samples[x, 1, q] - 2.0 * turn * across
+            across, swing = _across(samples, x, q, turn, pull)
             size += swing * swing
             product += swing * across
             rate += across * across
-        ratio = size / (square * limits[q] * limits[q])
-        worst = max(worst, ratio)
-        steep = 0.5 / np.sqrt(max(ratio, BENT))
-        values[q] = 2.0 * steep * max(ratio, BENT) + steep * (ratio - max(ratio, BENT)) - 1.0
-        unit = 2.0 * steep / (square * limits[q] * limits[q])
+        scale = 1.0 / (square * limits[q] * limits[q])
+        worst = max(worst, size * scale)
+        root, steep = _rooted(size * scale)
+        values[q] = root - 1.0
+        unit = 2.0 * steep * scale
         for x in range(3):
             thrust = samples[x, 1, q]
-            across = samples[x, 2, q] - turn * thrust
-            swing = samples[x, 3, q] - pull * thrust - 2.0 * turn * across
+            across, swing = _across(samples, x, q, turn, pull)
             by_thrust[x, q] = unit * (
                 (2.0 * turn * turn - pull) * swing
                 - 2.0 * product / square * (across - turn * thrust)
@@ -289,7 +300,7 @@ def _angular_acceleration(samples, count, limits, gravity, values, first, slopes
             )
             by_jerk[x, q] = -2.0 * unit * (turn * swing + product / square * thrust)
             by_snap[x, q] = unit * swing
-        bends[first, q] = 2.0 * steep * ratio / square
+        bends[first, q] = unit * size / square
         bends[first + 1, q] = 4.0 * unit * (turn * turn + rate / square)
         bends[first + 2, q] = unit
     return worst**0.125
@@ -298,18 +309,9 @@ def _angular_acceleration(samples, count, limits, gravity, values, first, slopes
 @vector
 def _angular_acceleration_kappa(samples, count, limit, gravity, out):
     for q in range(count):
-        square = WEIGHTLESS * gravity * gravity
-        along = 0.0
-        snap = 0.0
-        for x in range(3):
-            square += samples[x, 1, q] * samples[x, 1, q]
-            along += samples[x, 1, q] * samples[x, 2, q]
-            snap += samples[x, 1, q] * samples[x, 3, q]
+        square, turn, pull = _turn_of(samples, q, gravity)
         size = 0.0
         for x in range(3):
-            across = samples[x, 2, q] - along / square * samples[x, 1, q]
-            swing = (
-                samples[x, 3, q] - snap / square * samples[x, 1, q] - 2.0 * along / square * across
-            )
+            _, swing = _across(samples, x, q, turn, pull)
             size += swing * swing
         out[q] = np.sqrt(size / square) / limit

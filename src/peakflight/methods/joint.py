@@ -171,19 +171,26 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
                 f"{settings.max_pieces}"
             )
     runs = _runs(task, problem)
-    outcome = _finished(task, runs)
+    iterations = sum(run.iterations for run in runs)
+    outcome = replace(
+        _finished(task, runs), problem=complete, iterations=iterations, history=_history(runs)
+    )
     infeasible = outcome.status is Status.INFEASIBLE
     doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
-    if infeasible or (doubtful and task.effort is None):
-        other = peak.solve(_without_class(problem), peak.Settings())
-        found = other.status is not Status.INFEASIBLE
-        faster = other.trajectory.duration < (1.0 - TIE) * outcome.trajectory.duration
-        if found and (infeasible or faster):
-            status = Status.TIME_LIMIT if task.is_late else Status.NO_PROGRESS
-            outcome = replace(other, status=status, message=FELL_BACK)
-            complete = _without_class(problem)
-    iterations = sum(run.iterations for run in runs)
-    return replace(outcome, problem=complete, iterations=iterations, history=_history(runs))
+    if not (infeasible or (doubtful and task.effort is None)):
+        return outcome
+    spline = _without_class(problem)
+    other = peak.solve(spline, peak.Settings())
+    faster = other.trajectory.duration < (1.0 - TIE) * outcome.trajectory.duration
+    if other.status is Status.INFEASIBLE or not (infeasible or faster):
+        return outcome
+    return replace(
+        other,
+        status=Status.TIME_LIMIT if task.is_late else Status.NO_PROGRESS,
+        problem=spline,
+        iterations=iterations + other.iterations,
+        message=FELL_BACK,
+    )
 
 
 def _complete(problem: Problem) -> Problem:
@@ -252,30 +259,35 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         cuts = cuts and not (start.pieces > 1).any()
     runs = [_run(task, start, begin, ROUGH if cuts else settings.tolerance)]
     if cuts and not runs[0].ended:
-        runs.append(
-            _run(task, start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
-        )
+        runs.append(_from(task, runs[0], GOING_ON))
     for _ in range(ROUNDS if cuts else 0):
         last = runs[-1]
         parts = _parts(task, last)
         if not last.ended or task.is_late or (parts == 1).all():
             break
-        trajectory = last.trajectory.subdivide(parts)
-        leg = np.repeat(np.arange(len(last.pieces)), last.pieces)
-        pieces = np.bincount(leg, weights=parts).astype(np.int64)
-        runs.append(_run(task, start_of(trajectory, pieces, task.problem), GOING_ON))
+        runs.append(_from(task, _cut(last, parts), GOING_ON))
         if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
-    if not runs[-1].solved and runs[-1].ended:  # nothing to cut: only a rough run so far
-        runs.append(
-            _run(task, start_of(runs[0].trajectory, runs[0].pieces, task.problem), GOING_ON)
-        )
+    if runs[-1].ended and not runs[-1].solved:  # nothing to cut: only a rough run so far
+        runs.append(_from(task, runs[-1], GOING_ON))
     for _ in range(RETRIES):
-        last = runs[-1]
-        if last.solved or task.is_late:
+        if runs[-1].solved or task.is_late:
             break
-        runs.append(_run(task, start_of(last.trajectory, last.pieces, task.problem), AGAIN))
+        runs.append(_from(task, runs[-1], AGAIN))
     return runs
+
+
+def _from(task: _Task, run: _Run, begin: Begin, limits: np.ndarray | None = None) -> _Run:
+    """Run again from where a run has ended."""
+    start = start_of(run.trajectory, run.pieces, task.problem)
+    return _run(task, start, begin, limits=limits)
+
+
+def _cut(run: _Run, parts: np.ndarray) -> _Run:
+    """The same motion in more pieces: (K,) parts of each."""
+    leg = np.repeat(np.arange(len(run.pieces)), run.pieces)
+    pieces = np.bincount(leg, weights=parts).astype(np.int64)
+    return replace(run, trajectory=run.trajectory.subdivide(parts), pieces=pieces)
 
 
 def _parts(task: _Task, run: _Run) -> np.ndarray:
@@ -335,13 +347,11 @@ def _run(
         x = np.where(
             is_time, work.best + np.log(stretch), work.best / stretch ** np.maximum(layout.order, 0)
         )
-    if not _is_sound(layout, x):
+    if not _is_sound(layout, x):  # nor is the best: the start stands in
         unknowns.set_unknowns(layout, start.data, start.starts, start.times, x)
+        code = interior.STALLED
     data, starts, times = unknowns.get_data(layout, x)
     ended = code == interior.SOLVED
-    times = np.clip(
-        times, SHORTEST, LONGEST
-    )  # a run that diverges ends in no answer, not in an error
     leg = np.repeat(np.arange(len(start.pieces)), start.pieces)
     orders = basis.row_orders(class_.degree)[:-1]
     coefficients = coefficients_of(
@@ -412,8 +422,7 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         if task.is_late or not missed:
             break
         lowered = _lowered(lowered, np.fmin(_excess(task, run.trajectory), HOPELESS))
-        start = start_of(run.trajectory, run.pieces, task.problem)
-        run = _run(task, start, GOING_ON, limits=lowered)
+        run = _from(task, run, GOING_ON, lowered)
     if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
         answer = replace(answer, solved=False)
     return best, answer
@@ -441,8 +450,7 @@ def _tightened(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         if not excess.max() < HOPELESS:
             break
         lowered = _lowered(lowered, np.where(excess > 0.0, 2.0 * excess + 1e-8, 0.0))
-        start = start_of(run.trajectory, run.pieces, task.problem)
-        run = _run(task, start, WARM, limits=lowered)
+        run = _from(task, run, WARM, lowered)
     return None, run
 
 
@@ -464,8 +472,6 @@ def _given(task: _Task, problem: Problem) -> Start | None:
         if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
-            return None
-        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
             return None
         moved = problem.waypoints - plan.problem.waypoints
         start = start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
