@@ -52,7 +52,8 @@ def kernel_bounds(coefficients, times, limits):
     tables, limits = bounds.lookup_tables(degree), np.array(limits)
     bounds.certify(
         coefficients, np.array(times), limits, GRAVITY, tables, TOLERANCE, upper, lower, place,
-        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None,
+        bounds.quotients_workspace(degree) if np.isfinite(limits[4:6]).any() else None,
+        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None, 1,
     )  # fmt: skip
     return upper, lower, place
 

@@ -15,7 +15,7 @@ from peakflight.trajectory import Trajectory
 pytestmark = pytest.mark.kernels
 
 NAN = np.nan
-TURNING = np.ones(1)
+LEANING = TURNING = np.ones(1)
 NAMES = (*[kind.name for kind in KINDS[:6]], "body_rate", "angular_acceleration")
 LIMITS = np.array([5.0, 15.5, 62.0, 800.0, 0.7, 8.0, 3.0, 25.0])
 """One for each kind; thrust in the samples below is around gravity."""
@@ -29,16 +29,16 @@ every_kind = pytest.mark.parametrize("kind", range(len(rows.KIND_TERMS)), ids=NA
 
 @kernel
 def call_constrain(
-    kind, turning, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
 ):  # fmt: skip
     return rows.constrain(
-        kind, turning, samples, count, limits, gravity, values, first, slopes, bends
+        kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
     )
 
 
 @kernel
-def call_kappa(kind, turning, samples, count, limit, gravity, out):
-    rows.kappa(kind, turning, samples, count, limit, gravity, out)
+def call_kappa(kind, leaning, turning, samples, count, limit, gravity, out):
+    rows.kappa(kind, leaning, turning, samples, count, limit, gravity, out)
 
 
 @kernel
@@ -104,7 +104,7 @@ def constrain(kind, samples, limits):
     slopes, bends = np.full((terms + 2, 3, count), NAN), np.full((terms + 2, count), NAN)
     limits = np.broadcast_to(limits, count).copy()
     stretch = call_constrain(
-        kind, TURNING, samples, count, limits, GRAVITY, values, 1, slopes, bends
+        kind, LEANING, TURNING, samples, count, limits, GRAVITY, values, 1, slopes, bends
     )
     for array in (slopes, bends):
         assert np.isnan(array[0]).all()
@@ -114,7 +114,7 @@ def constrain(kind, samples, limits):
 
 def kappa(kind, samples, limit):
     out = np.full(samples.shape[2], NAN)
-    call_kappa(kind, TURNING, samples, samples.shape[2], limit, GRAVITY, out)
+    call_kappa(kind, LEANING, TURNING, samples, samples.shape[2], limit, GRAVITY, out)
     return out
 
 

@@ -142,9 +142,8 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
     _check_axes(trajectory)
     coefficients = fresh(trajectory.coefficients)
     times = fresh(trajectory.segment_times)
-    factor = bounds.stretch(
-        *_arguments(coefficients, times, limits, np.empty((len(times), len(KINDS))))
-    )
+    upper = np.empty((len(times), len(KINDS)))
+    factor = bounds.certify(*_arguments(coefficients, times, limits, upper), bounds.ROUNDS)
     if not (np.isfinite(factor) and times.min() >= SHORTEST and times.max() <= LONGEST):
         return None
     return Trajectory(coefficients, times, trajectory.start_time), float(factor)
@@ -158,7 +157,7 @@ def peak_ratios(trajectory: Trajectory, limits: Limits) -> np.ndarray:
 
 def _bound(coefficients: np.ndarray, times: np.ndarray, limits: Limits) -> np.ndarray:
     upper = np.empty((len(times), len(KINDS)))
-    bounds.certify(*_arguments(coefficients, times, limits, upper))
+    bounds.certify(*_arguments(coefficients, times, limits, upper), 1)
     return upper
 
 
@@ -176,7 +175,7 @@ def _firsts(pieces: Sequence[int], segments: int) -> np.ndarray:
 def _arguments(
     coefficients: np.ndarray, times: np.ndarray, limits: Limits, upper: np.ndarray
 ) -> tuple[Any, ...]:
-    """What the kernels of `bounds` take; upper (K, len(KINDS)) is where bounds will be."""
+    """What `bounds.certify` takes before `rounds`; upper (K, len(KINDS)) gets the bounds."""
     degree = coefficients.shape[1] - 1
     return (
         coefficients,
@@ -188,6 +187,7 @@ def _arguments(
         upper,
         np.empty_like(upper),
         np.empty_like(upper),
+        bounds.quotients_workspace(degree) if limits.on_leaning else None,
         turning.workspace(degree) if limits.on_turning else None,
     )
 

@@ -108,6 +108,11 @@ class Limits:
         return tuple(kind for kind in KINDS if getattr(self, kind.name) is not None)
 
     @property
+    def on_leaning(self) -> bool:
+        """Whether tilt or least thrust is limited: quotients, which kernels else leave out."""
+        return self.tilt is not None or self.least_thrust_acceleration is not None
+
+    @property
     def on_turning(self) -> bool:
         """Whether how fast the thrust direction turns is limited: kernels of its own prove that."""
         return self.body_rate is not None or self.angular_acceleration is not None

@@ -47,55 +47,45 @@ LONGEST = 1e30
 
 
 def lookup_tables(degree: int) -> tuple[np.ndarray, ...]:
-    """What `certify` and `stretch` look up for pieces of a degree."""
+    """What `certify` looks up for pieces of a degree."""
     return (*bernstein_tables(degree), falling_factorials(degree), binomials(degree))
 
 
+def quotients_workspace(degree: int) -> np.ndarray:
+    """Where `certify` keeps the denominators of kinds that are about quotients."""
+    return np.empty((DEPTH + 3, 2 * degree + 1))
+
+
 @kernel
-def certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns):
-    """Certified kappa of every piece and kind.
+def certify(
+    coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
+    turns, rounds,
+):  # fmt: skip
+    """Certified kappa of every piece and kind; and the smallest uniform stretch that keeps limits.
 
     coefficients (K, N+1, 3), times (K,), limits as `Limits.as_array`; tables: of
-    `lookup_tables`; upper and lower (K, kinds) get the bound and, but
-    for rounding, a value that is attained (NaN for kinds that are not limited), place (K, kinds)
-    where, in normalised time. turns: `turning.workspace`,
-    or None where no kind from TURNING on is limited: it is compiled without them then.
-    """
-    degree = coefficients.shape[1] - 1
-    points = np.empty((degree + 1, 3))
-    numerators = np.empty((DEPTH + 3, 2 * degree + 1))
-    denominators = np.empty((DEPTH + 3, 2 * degree + 1))
-    ends = np.empty((DEPTH + 3, 3))
-    for k in range(times.size):
-        for kind in range(limits.size):
-            upper[k, kind] = np.nan
-            lower[k, kind] = np.nan
-            place[k, kind] = 0.0
-            if not limits[kind] > 0.0:
-                continue
-            low, high, place[k, kind] = _range(
-                kind, coefficients, k, times[k], gravity, tables, tolerance, points, numerators,
-                denominators, ends, turns,
-            )  # fmt: skip
-            upper[k, kind] = _ratio(kind, high, limits[kind], True)
-            lower[k, kind] = _ratio(kind, low, limits[kind], False)
+    `lookup_tables`; upper and lower (K, kinds) get the bound and, but for rounding, a value that
+    is attained (NaN for kinds that are not limited), place (K, kinds) where, in normalised time.
+    denominators: `quotients_workspace`, or None where neither tilt nor least thrust is limited;
+    turns: `turning.workspace`, or None where no kind from TURNING on is. It is compiled without
+    them then.
 
-
-@kernel
-def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns):
-    """Scale a trajectory by the smallest uniform stretch that keeps every limit, certified.
-
-    As `certify`, with coefficients and times replaced; upper, lower and place are scratch. Returns
-    the stretch, or NaN if there is none. The path stays: derivative s is divided by the stretch to
-    the power s.
+    With rounds = 1 that is all. With more, up to ROUNDS, a trajectory is then scaled until it just
+    keeps every limit, certified: coefficients and times are replaced, and the stretch is returned,
+    or NaN if there is none. The path stays: derivative s is divided by the stretch to the power s.
     """
     original = coefficients.copy()
     durations = times.copy()
     factor = 1.0
     infeasible = 0.0  # the largest factor that is known not to do
     best = np.inf
-    for _ in range(ROUNDS):
-        certify(coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, turns)
+    for _ in range(rounds):
+        _bound(
+            coefficients, times, limits, gravity, tables, tolerance, upper, lower, place,
+            denominators, turns,
+        )  # fmt: skip
+        if rounds == 1:
+            return factor
         feasible = True
         needed = 0.0
         for k in range(times.size):
@@ -136,6 +126,31 @@ def stretch(coefficients, times, limits, gravity, tables, tolerance, upper, lowe
     if best != factor:
         _rescale(original, durations, best, coefficients, times)
     return best
+
+
+@within
+def _bound(
+    coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
+    turns,
+):  # fmt: skip
+    """One round of `certify`."""
+    degree = coefficients.shape[1] - 1
+    points = np.empty((degree + 1, 3))
+    numerators = np.empty((DEPTH + 3, 2 * degree + 1))
+    ends = np.empty((DEPTH + 3, 3))
+    for k in range(times.size):
+        for kind in range(limits.size):
+            upper[k, kind] = np.nan
+            lower[k, kind] = np.nan
+            place[k, kind] = 0.0
+            if not limits[kind] > 0.0:
+                continue
+            low, high, place[k, kind] = _range(
+                kind, coefficients, k, times[k], gravity, tables, tolerance, points, numerators,
+                denominators, ends, turns,
+            )  # fmt: skip
+            upper[k, kind] = _ratio(kind, high, limits[kind], True)
+            lower[k, kind] = _ratio(kind, low, limits[kind], False)
 
 
 @inner
@@ -202,47 +217,46 @@ def _range(
             KIND_ORDERS[kind], coefficients, piece, time, gravity, tables, tolerance, points, turns,
             ends,
         )  # fmt: skip
-    size, plain, defined = _quotient(
-        kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
-    )
-    if not defined:
-        return np.inf, np.inf, 0.0
-    return _largest(numerators, denominators, plain, size, tolerance, ends)
-
-
-@within
-def _quotient(
-    kind, coefficients, piece, time, gravity, tables, points, numerators, denominators, ends
-):
-    """Control points of the quotient whose maximum a kind bounds, in row 0 of the stacks.
-
-    Returns their degree, whether the denominator is one, and whether the quotient is defined.
-    """
     order = KIND_ORDERS[kind]
     gravity = gravity if order == 2 else 0.0
-    plain = kind not in (4, 5)
     degree = max(coefficients.shape[1] - 1 - order, 0)
     error, _ = control_points(
         coefficients, piece, time, order, degree, gravity, tables[0], tables[2], points
     )
     if not error < np.inf:  # overflow, or not a number
-        return 2 * degree, plain, False
+        return np.inf, np.inf, 0.0
+    if denominators is None:
+        pass
+    elif kind in (4, 5):
+        if not _quotient(kind, points, degree, error, tables[1], numerators, denominators, ends):
+            return np.inf, np.inf, 0.0
+        return _largest(numerators, denominators, 2 * degree, tolerance, ends)
+    _square(points, 0, degree, error, tables[1], 1.0, numerators)
+    return _largest(numerators, None, 2 * degree, tolerance, ends)
+
+
+@inner
+def _quotient(kind, points, degree, error, product, numerators, denominators, ends):
+    """Control points of the quotient whose maximum a kind bounds, in row 0 of the stacks.
+
+    points (degree+1, 3): control points of a + g e3. Returns whether the quotient is defined.
+    """
     if kind == 5:  # 1 / |a + g e3|^2
-        _square(points, 0, degree, error, tables[1], -1.0, denominators)
+        _square(points, 0, degree, error, product, -1.0, denominators)
         for i in range(2 * degree + 1):
             numerators[0, i] = 1.0
-        return 2 * degree, plain, True
-    if kind == 4:  # |a_xy|^2 / (a_z + g)^2, the squared tangent of the tilt
-        for i in range(degree + 1):
-            numerators[0, i] = error - points[i, 2]
-        _, high, _ = _largest(numerators, denominators, not plain, degree, 1e-3, ends)
-        if not high < 0.0:
-            return 2 * degree, plain, False
-        _square(points, 2, degree, error, tables[1], -1.0, denominators)
-        for i in range(degree + 1):
-            points[i, 2] = 0.0
-    _square(points, 0, degree, error, tables[1], 1.0, numerators)
-    return 2 * degree, plain, True
+        return True
+    # |a_xy|^2 / (a_z + g)^2, the squared tangent of the tilt
+    for i in range(degree + 1):
+        numerators[0, i] = error - points[i, 2]
+    _, high, _ = _largest(numerators, None, degree, 1e-3, ends)
+    if not high < 0.0:
+        return False
+    _square(points, 2, degree, error, product, -1.0, denominators)
+    for i in range(degree + 1):
+        points[i, 2] = 0.0
+    _square(points, 0, degree, error, product, 1.0, numerators)
+    return True
 
 
 @inner
@@ -284,17 +298,17 @@ def _square(points, first, degree, error, product, sign, out):
 
 
 @inner
-def _largest(numerators, denominators, plain, degree, tolerance, ends):
+def _largest(numerators, denominators, degree, tolerance, ends):
     """Bounds of the largest quotient over [0, 1] from the control points in row 0.
 
-    plain: the denominator is one. Returns an attained value, an upper bound, and where the first
-    is attained.
+    denominators: None if they are one. Returns an attained value, an upper bound, and where the
+    first is attained.
     """
     low = -np.inf
     high = -np.inf
     place = 0.0
     for side in range(2):
-        value = _at_end(numerators, denominators, plain, 0, side * degree)
+        value = _at_end(numerators, denominators, 0, side * degree)
         if value > low:
             low = value
             place = float(side)
@@ -308,7 +322,7 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
         bound = -np.inf
         index = 0
         for i in range(degree + 1):
-            value = _at_end(numerators, denominators, plain, waiting, i)
+            value = _at_end(numerators, denominators, waiting, i)
             if not value <= bound:
                 bound = value
                 index = i
@@ -323,18 +337,18 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
         at = 0.5
         if splits < 8 and 0 < index < degree:
             at = index / degree
-            if plain and degree >= 2:
+            if denominators is None and degree >= 2:
                 at = _newton(numerators, waiting, waiting + 2, degree, at)
         middle = ends[waiting, 0] + at * (ends[waiting, 1] - ends[waiting, 0])
         _split(numerators, waiting, degree, at)
-        if not plain:
+        if denominators is not None:
             _split(denominators, waiting, degree, at)
         ends[waiting + 1, 0] = ends[waiting, 0]
         ends[waiting + 1, 1] = middle
         ends[waiting, 0] = middle
         ends[waiting, 2] += 1.0
         ends[waiting + 1, 2] = ends[waiting, 2]
-        value = _at_end(numerators, denominators, plain, waiting, 0)
+        value = _at_end(numerators, denominators, waiting, 0)
         if value > low and value < np.inf:
             low = value
             place = middle
@@ -344,9 +358,9 @@ def _largest(numerators, denominators, plain, degree, tolerance, ends):
 
 
 @inner
-def _at_end(numerators, denominators, plain, row, i):
+def _at_end(numerators, denominators, row, i):
     """Quotient of two control points; infinite where the denominator may vanish."""
-    if plain:
+    if denominators is None:
         return numerators[row, i]
     if denominators[row, i] > 0.0:
         return numerators[row, i] / denominators[row, i]

@@ -74,9 +74,11 @@ class Limited(NamedTuple):
     """(R+1,) int: the first of each kind's terms."""
     orders: np.ndarray
     """(P,) int: row of samples, derivative less one, of each term."""
-    turning: np.ndarray | None
-    """Some number if a kind has more than one term; None leaves out what such kinds need when
+    leaning: np.ndarray | None
+    """Some number if tilt or least thrust is among them; None leaves out what these need when
     kernels are compiled."""
+    turning: np.ndarray | None
+    """Some number if a kind has more than one term; None likewise."""
     effort: np.ndarray | None
     """(4,) weight of the integral of each squared derivative in the objective; None likewise."""
     gravity: np.ndarray
@@ -142,9 +144,9 @@ def evaluate(layout, grid, limited, work, x):
             own = max(
                 own,
                 rows.constrain(
-                    limited.kinds[r], limited.turning, work.samples[k], count, work.limits[k, r],
-                    limited.gravity[0], work.values[k, r], limited.first[r], work.slopes[k],
-                    work.bends[k],
+                    limited.kinds[r], limited.leaning, limited.turning, work.samples[k], count,
+                    work.limits[k, r], limited.gravity[0], work.values[k, r], limited.first[r],
+                    work.slopes[k], work.bends[k],
                 ),
             )  # fmt: skip
         needed = max(needed, own)
@@ -388,11 +390,13 @@ def lower(layout, grid, limited, work, x, slowly):
         for r in range(limited.kinds.size):
             kind, limit = limited.kinds[r], limited.values[r]
             rows.kappa(
-                kind, limited.turning, near, count * cells, limit, limited.gravity[0], around
-            )
+                kind, limited.leaning, limited.turning, near, count * cells, limit,
+                limited.gravity[0], around,
+            )  # fmt: skip
             rows.kappa(
-                kind, limited.turning, work.samples[k], count, limit, limited.gravity[0], there
-            )
+                kind, limited.leaning, limited.turning, work.samples[k], count, limit,
+                limited.gravity[0], there,
+            )  # fmt: skip
             for q in range(count):
                 peak = 1e-300
                 for c in range(cells):

@@ -175,23 +175,31 @@ def _add_least_thrust(samples, squares, count, row, gravity, grown, weights, ver
 
 
 @vector
+def _swing(samples, q, row, gravity):
+    """F, 1 / F.F, r and y of a sample, with y = d - r j: d is the derivative of the row, and r is
+    2 F.j / F.F for the angular acceleration, 0 for the body rate; see the top.
+    """
+    fx = samples[0, 1, q]
+    fy = samples[1, 1, q]
+    fz = samples[2, 1, q] + gravity
+    inverse = 1.0 / (fx * fx + fy * fy + fz * fz + (GUARD * gravity) ** 2)
+    twist = 2.0 * inverse if row == 3 else 0.0
+    jx = samples[0, 2, q]
+    jy = samples[1, 2, q]
+    jz = samples[2, 2, q]
+    r = twist * (fx * jx + fy * jy + fz * jz)
+    x = samples[0, row, q] - r * jx
+    y = samples[1, row, q] - r * jy
+    z = samples[2, row, q] - r * jz
+    return fx, fy, fz, inverse, r, x, y, z
+
+
+@vector
 def _turn(samples, count, row, limit, gravity, values):
     """(|F x y| / F.F)^2 / limit^2, as (y.y - (F.y)^2 / F.F) / F.F; see the top."""
-    guard = (GUARD * gravity) ** 2
-    twist = 2.0 if row == 3 else 0.0
     factor = 1.0 / (limit * limit)
     for q in range(count):
-        fx = samples[0, 1, q]
-        fy = samples[1, 1, q]
-        fz = samples[2, 1, q] + gravity
-        inverse = 1.0 / (fx * fx + fy * fy + fz * fz + guard)
-        jx = samples[0, 2, q]
-        jy = samples[1, 2, q]
-        jz = samples[2, 2, q]
-        r = twist * inverse * (fx * jx + fy * jy + fz * jz)
-        x = samples[0, row, q] - r * jx
-        y = samples[1, row, q] - r * jy
-        z = samples[2, row, q] - r * jz
+        fx, fy, fz, inverse, _, x, y, z = _swing(samples, q, row, gravity)
         along = fx * x + fy * y + fz * z
         across = max(x * x + y * y + z * z - along * along * inverse, 0.0)
         values[q] = factor * inverse * across
@@ -199,20 +207,12 @@ def _turn(samples, count, row, limit, gravity, values):
 
 @vector
 def _add_turn(samples, count, row, limit, gravity, factor, values, grown, pulls):
-    guard = (GUARD * gravity) ** 2
     twist = 2.0 if row == 3 else 0.0
     for q in range(count):
-        fx = samples[0, 1, q]
-        fy = samples[1, 1, q]
-        fz = samples[2, 1, q] + gravity
-        inverse = 1.0 / (fx * fx + fy * fy + fz * fz + guard)
+        fx, fy, fz, inverse, r, x, y, z = _swing(samples, q, row, gravity)
         jx = samples[0, 2, q]
         jy = samples[1, 2, q]
         jz = samples[2, 2, q]
-        r = twist * inverse * (fx * jx + fy * jy + fz * jz)
-        x = samples[0, row, q] - r * jx
-        y = samples[1, row, q] - r * jy
-        z = samples[2, row, q] - r * jz
         c = inverse * (fx * x + fy * y + fz * z)
         whole = 2.0 * factor * grown[q]
         push = whole * inverse / (limit * limit * values[q] + TINY)

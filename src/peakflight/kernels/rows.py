@@ -17,6 +17,8 @@ from peakflight.kernels.jit import inner, vector
 
 KIND_TERMS: tuple[tuple[int, ...], ...] = ((1,), (2,), (3,), (4,), (2,), (2,), (2, 3), (2, 3, 4))
 """The derivatives that each kind depends on."""
+LEANING = frozenset((4, 5))
+"""Tilt and least thrust, which are compiled only where one of them is limited."""
 ROOTS = np.array([0, 0, 1, 2])
 """Square roots taken of |d|^2 / L^2 for speed, thrust, jerk and snap: they tame high orders."""
 TINY = 1e-150
@@ -30,12 +32,14 @@ WEIGHTLESS = 1e-8
 
 
 @inner
-def constrain(kind, turning, samples, count, limits, gravity, values, first, slopes, bends):
+def constrain(
+    kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
+):
     """Values, slopes and bends of a kind at the samples of a piece; returns the stretch they need.
 
     samples (3, 4, S): axes, derivatives, samples; limits, values (S,); slopes (P, 3, S) and
-    bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; turning:
-    None if no kind has more than one term.
+    bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; leaning,
+    turning: None if no kind of theirs is limited.
     """
     slope = slopes[first]
     bend = bends[first]
@@ -43,11 +47,19 @@ def constrain(kind, turning, samples, count, limits, gravity, values, first, slo
         return _thrust(samples, count, limits, gravity, values, slope, bend)
     if kind < 4:
         return _norm(samples, kind, count, limits, ROOTS[kind], values, slope, bend)
+    if kind < 6:
+        return _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend)
+    return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
+
+
+@inner
+def _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend):
+    """Tilt and least thrust; not compiled where neither is set."""
+    if leaning is None:
+        return 0.0
     if kind == 4:
         return _tilt(samples, count, limits, gravity, values, slope, bend)
-    if kind == 5:
-        return _least_thrust(samples, count, limits, gravity, values, slope, bend)
-    return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
+    return _least_thrust(samples, count, limits, gravity, values, slope, bend)
 
 
 @inner
@@ -61,16 +73,24 @@ def _turn(turning, kind, samples, count, limits, gravity, values, first, slopes,
 
 
 @inner
-def kappa(kind, turning, samples, count, limit, gravity, out):
+def kappa(kind, leaning, turning, samples, count, limit, gravity, out):
     """Out (S,) <- peak over limit of each sample (Eq. kapp_i, Eq. kappa2)."""
     if kind < 4:
         _norm_kappa(samples, kind, count, limit, out)
-    elif kind == 4:
-        _tilt_kappa(samples, count, limit, out)
-    elif kind == 5:
-        _least_thrust_kappa(samples, count, limit, out)
+    elif kind < 6:
+        _lean_kappa(leaning, kind, samples, count, limit, out)
     else:
         _turn_kappa(turning, kind, samples, count, limit, gravity, out)
+
+
+@inner
+def _lean_kappa(leaning, kind, samples, count, limit, out):
+    if leaning is None:
+        return
+    if kind == 4:
+        _tilt_kappa(samples, count, limit, out)
+    else:
+        _least_thrust_kappa(samples, count, limit, out)
 
 
 @inner

@@ -9,7 +9,7 @@ import numpy as np
 from peakflight.kernels import basis
 from peakflight.kernels.conditions import Grid, Layout, Limited, Work
 from peakflight.kernels.interior import MARKS
-from peakflight.kernels.rows import KIND_TERMS
+from peakflight.kernels.rows import KIND_TERMS, LEANING
 
 CELL = 5
 """Points at which the neighbourhood of a sample is looked at."""
@@ -167,6 +167,7 @@ def make_limited(
         values=limits[kinds],
         first=np.cumsum([0, *map(len, terms)]),
         orders=np.array([order - 1 for term in terms for order in term]),
+        leaning=np.ones(1) if LEANING.intersection(kinds) else None,
         turning=np.ones(1) if any(len(term) > 1 for term in terms) else None,
         effort=effort,
         gravity=np.array([gravity]),

@@ -84,8 +84,14 @@ def require_whole(name: str, value: int, low: int, high: int) -> None:
 def spline_kernels(problem: Problem) -> str:
     """Which kernels solve the spline of a problem and look at its limits."""
     plain = problem.spline_class.is_classical and not problem.derivatives
-    turning = "-turning" if problem.limits.on_turning else ""
-    return f"{problem.spline_class.degree}-{'plain' if plain else 'general'}{turning}"
+    spline = "plain" if plain else "general"
+    return f"{problem.spline_class.degree}-{spline}{limit_kernels(problem)}"
+
+
+def limit_kernels(problem: Problem) -> str:
+    """Which kernels look at the limits of a problem: those not set are left out of them."""
+    leaning = "-leaning" if problem.limits.on_leaning else ""
+    return leaning + ("-turning" if problem.limits.on_turning else "")
 
 
 def find(name: str) -> Method:

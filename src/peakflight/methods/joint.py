@@ -18,7 +18,14 @@ from peakflight.kernels import basis, interior, unknowns
 from peakflight.kernels.conditions import Layout
 from peakflight.kernels.interior import Begin
 from peakflight.limits import GRAVITY, KINDS
-from peakflight.methods import Outcome, peak, proportional, require, require_whole
+from peakflight.methods import (
+    Outcome,
+    limit_kernels,
+    peak,
+    proportional,
+    require,
+    require_whole,
+)
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.methods.start import Start, guess, start_of
 from peakflight.problem import DEGREES, Problem, derivative_name
@@ -148,8 +155,7 @@ class _Run:
 
 def kernels(problem: Problem, settings: Settings) -> str:
     """Those of the kinds of limit and of effort."""
-    turning = "turning" if problem.limits.on_turning else "plain"
-    return f"joint-{turning}-{'effort' if settings.effort else 'time'}"
+    return f"joint-{'effort' if settings.effort else 'time'}{limit_kernels(problem)}"
 
 
 def solve(problem: Problem, settings: Settings) -> Outcome:
