@@ -41,6 +41,9 @@ NEARNESS = 5e-3
 PATIENCE = 15
 """Iterations without gain after which a run ends: as solved if only the stretch is in the way, of
 the best iterate up to ten times the tolerance; else as stalled."""
+CLOSER, NEARLY, ENOUGH = 0.1, 1e-3, 5
+"""If the gap is below the first part of the tolerance and the stretch of the best iterate below the
+second, so many are enough: one bad leg of thousands is then all that is in the way."""
 STRETCHES, EXACT = 3, 1e-9
 """Most stretches of a start, and how close they come; one does, save for kinds whose stretch is an
 estimate."""
@@ -91,8 +94,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
     anew: whether to begin from x; otherwise the last run goes on. tolerance: relative gap, stretch
     and decrement at which a run ends as solved.
     """
-    if anew:
-        _begin(layout, grid, limited, work, begin)
+    needed, time, effort = _begin(layout, grid, limited, work, anew, begin)
     x, marks = work.x, work.marks
     values = work.values.reshape(-1)
     slack = work.slack.reshape(-1)
@@ -105,7 +107,6 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
     step = np.empty_like(x)
     count = values.size
     whole = not layout.steps.any()
-    needed, time, effort = conditions.evaluate(layout, grid, limited, work, x)
     objective = time * needed + effort
     for _ in range(iterations):
         before = _residuals(values, slack, dual, residual, pulls)
@@ -184,29 +185,41 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
             closed = marks[DECREMENT] < tolerance
             if closed and needed < 1.0 + tolerance:
                 return SOLVED
-        if marks[GAP] < 10.0 * tolerance and marks[COUNT] - marks[LAST] >= PATIENCE:
+        idle = marks[COUNT] - marks[LAST]
+        nearly = marks[GAP] < CLOSER * tolerance and marks[STRETCH] < 1.0 + NEARLY
+        if closed and nearly and idle >= ENOUGH:
+            return SOLVED
+        if marks[GAP] < 10.0 * tolerance and idle >= PATIENCE:
             return SOLVED if closed and marks[STRETCH] < 1.0 + 10.0 * tolerance else STALLED
     return LIMIT
 
 
 @within
-def _begin(layout, grid, limited, work, begin):
-    """Make x strictly feasible by a uniform stretch, and start slacks and multipliers."""
-    for r in range(limited.kinds.size):
-        for k in range(work.limits.shape[0]):
-            for q in range(work.limits.shape[2]):
-                work.limits[k, r, q] = limited.values[r]
+def _begin(layout, grid, limited, work, anew, begin):
+    """Evaluate x; if it is a new start, make it strictly feasible by a uniform stretch, and start
+    slacks and multipliers.
+
+    Returns the stretch that is needed, total time and effort.
+    """
+    if anew:
+        for r in range(limited.kinds.size):
+            for k in range(work.limits.shape[0]):
+                for q in range(work.limits.shape[2]):
+                    work.limits[k, r, q] = limited.values[r]
     needed, time, effort = 0.0, 0.0, 0.0
     for attempt in range(STRETCHES + 1):
         needed, time, effort = conditions.evaluate(layout, grid, limited, work, work.x)
         factor = max(needed * begin.margin, 1e-3)
-        if begin.margin == 0.0 or attempt == STRETCHES or abs(factor - 1.0) < EXACT:
+        enough = begin.margin == 0.0 or attempt == STRETCHES or abs(factor - 1.0) < EXACT
+        if enough or not anew:
             break
         for i in range(work.x.size):
             if layout.order[i] < 0:
                 work.x[i] += np.log(factor)
             else:
                 work.x[i] /= factor ** layout.order[i]
+    if not anew:
+        return needed, time, effort
     values = work.values.reshape(-1)
     slack = work.slack.reshape(-1)
     dual = work.dual.reshape(-1)
@@ -226,6 +239,7 @@ def _begin(layout, grid, limited, work, begin):
     marks[DECREMENT] = np.inf
     for i in range(work.x.size):
         work.best[i] = work.x[i]
+    return needed, time, effort
 
 
 @inner
