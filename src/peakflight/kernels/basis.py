@@ -12,7 +12,7 @@ time is the one by u over h^o. All tables are computed in rationals and rounded 
 
 from fractions import Fraction
 from functools import lru_cache
-from math import perm
+from math import factorial, perm, sqrt
 
 import numpy as np
 
@@ -75,6 +75,26 @@ def energy(degree: int, order: int) -> np.ndarray:
     moments = [[Fraction(1, i + j + 1) for j in range(count)] for i in range(count)]
     halfway = [[_dot(row, moments[j]) for j in range(count)] for row in derived]
     return np.array([[float(_dot(a, b)) for b in derived] for a in halfway])
+
+
+@lru_cache
+def energy_roots(degree: int, order: int) -> np.ndarray:
+    """(N+1, N+1) R with: integral over u of (d^order p / du^order)^2 = |R y|^2, for `energy`.
+
+    Row j < N+1 - order holds the part of the derivative along Legendre polynomial j; the others are
+    zero.
+    """
+    size, count = degree + 1, degree + 1 - order
+    derived = [[_falling(i, order) * c[i] for i in range(order, size)] for c in _columns(degree)]
+    roots = np.zeros((size, size))
+    for j in range(count):  # the integral of u^i times the polynomial
+        along = [Fraction(0)] * j
+        along += [
+            Fraction(factorial(i) ** 2, factorial(i - j) * factorial(i + j + 1))
+            for i in range(j, count)
+        ]
+        roots[j] = sqrt(2 * j + 1) * np.array([float(_dot(row, along)) for row in derived])
+    return roots
 
 
 @lru_cache
