@@ -70,9 +70,14 @@ def add_axes(figure: Figure, left: float, bottom: float, width: float, height: f
 def write_headline(figure: Figure, plan: Plan, left: float) -> None:
     """Write total time, method and whether the plan is certified, from `left` inches on."""
     proof = "certified" if plan.feasible else f"not certified ({plan.status})"
+    write_title(figure, f"{seconds(plan.duration)} by method {plan.method}, {proof}", left)
+
+
+def write_title(figure: Figure, text: str, left: float) -> None:
+    """Write what a figure shows on top of it, from `left` inches on."""
     across, up = figure.get_size_inches()
     figure.suptitle(
-        f"{seconds(plan.duration)} by method {plan.method}, {proof}",
+        text,
         x=left / across,
         y=1.0 - 0.07 / up,
         ha="left",
