@@ -78,6 +78,20 @@ def energy(degree: int, order: int) -> np.ndarray:
 
 
 @lru_cache
+def energy_roots(degree: int, order: int) -> np.ndarray:
+    """(N+1, N+1) R with: integral over u of (d^order p / du^order)^2 = |R y|^2, for `energy`.
+
+    It has N+1 - order rows that are not zero.
+    """
+    size, count = degree + 1, degree + 1 - order
+    scales = np.array([_falling(i, order) for i in range(order, size)], dtype=float)
+    moments = np.linalg.cholesky(1.0 / (1.0 + np.add.outer(np.arange(count), np.arange(count))))
+    roots = np.zeros((size, size))
+    roots[:count] = moments.T @ (scales[:, None] * to_monomials(degree)[order:])
+    return roots
+
+
+@lru_cache
 def sample_tables(degree: int, count: int) -> np.ndarray:
     """(N, 4, count): derivatives 1..4 by u of each basis function at even points, ends included."""
     return derivative_tables(degree, np.linspace(0.0, 1.0, count))

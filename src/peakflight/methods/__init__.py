@@ -1,8 +1,9 @@
 """The methods that answer a problem, one file each, all of one signature.
 
-A method is a function `solve(problem, settings) -> Outcome` in a module of its own, beside the
-frozen type of its settings. A new one is its file and one line in `METHODS`: `plan`, the command
-line and the tests pick it up from there.
+A method is a module of its own with a frozen type `Settings` and two functions of a problem and
+its settings: `solve` hands back an `Outcome`, `kernels` says which compiled kernels that takes. A
+new one is its file and one line in `METHODS`: `plan`, the command line and the tests pick it up
+from there.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from peakflight.trajectory import Trajectory
 
 METHODS = {
     "proportional": "times proportional to distance, stretched until feasible",
+    "mellinger": "least jerk or snap at a fixed total time, stretched until feasible",
+    "bry": "least jerk or snap plus a penalty on time, raised until a limit is reached",
     "peak": "best segment times for the spline, or the paper's Algorithm 1 (variant paper)",
     "joint": "durations and coefficients together: the fastest",
 }
