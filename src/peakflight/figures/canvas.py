@@ -67,10 +67,11 @@ def add_axes(figure: Figure, left: float, bottom: float, width: float, height: f
     return axes
 
 
-def write_headline(figure: Figure, plan: Plan, left: float) -> None:
-    """Write total time, method and whether the plan is certified, from `left` inches on."""
+def write_headline(figure: Figure, plan: Plan, left: float, title: str | None = None) -> None:
+    """Write total time, method and proof of a plan, or a title, from `left` inches on."""
     proof = "certified" if plan.feasible else f"not certified ({plan.status})"
-    write_title(figure, f"{seconds(plan.duration)} by method {plan.method}, {proof}", left)
+    otherwise = f"{seconds(plan.duration)} by method {plan.method}, {proof}"
+    write_title(figure, otherwise if title is None else title, left)
 
 
 def write_title(figure: Figure, text: str, left: float) -> None:
@@ -117,13 +118,6 @@ def seconds(duration: float) -> str:
     """Print a time to four figures, with its unit."""
     decimals = max(0, 3 - math.floor(math.log10(duration))) if duration > 0.0 else 0
     return f"{duration:.{min(decimals, 6)}f} s"
-
-
-def plain_unit(unit: str) -> str:
-    """Write a unit as it is printed: m/s² for m/s^2."""
-    for power, raised in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
-        unit = unit.replace(power, raised)
-    return unit
 
 
 def even_step(count: int, most: int) -> int:

@@ -19,13 +19,12 @@ from peakflight.figures.canvas import (
     add_axes,
     even_step,
     new_figure,
-    plain_unit,
     span,
     text_width,
     write_headline,
     write_note,
 )
-from peakflight.limits import KINDS, LARGEST, LimitKind, Limits, limited_values
+from peakflight.limits import KINDS, LARGEST, LimitKind, Limits, limited_values, plain_unit
 from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 

@@ -112,7 +112,9 @@ def evaluate(rows, waypoints, simple, layered, times, cost, data, slope, gradien
         return np.inf
     total = 0.0
     for k in range(times.size):
-        total += _effort(rows, waypoints, times[k], orders, weights, roots, data, slope, k, gradient)
+        total += _effort(
+            rows, waypoints, times[k], orders, weights, roots, data, slope, k, gradient
+        )
     spline_adjoint(rows, waypoints, simple, layered, times, data, slope, gradient)
     for k in range(times.size):
         gradient[k] /= times[k]
