@@ -716,9 +716,9 @@ def test_the_registry_names_modules_that_solve():
         module = registry.find(name)
         assert module.__name__ == f"peakflight.methods.{name}"
         assert callable(module.solve)
-        module.Settings()
+        assert module.kernels(Problem(CORNER, **JERK), module.Settings())
         assert "\n" not in summary
-    with pytest.raises(InvalidProblem, match="unknown method 'magic'; known are proportional, pea"):
+    with pytest.raises(InvalidProblem, match="unknown method 'magic'; known are proportional, mell"):
         registry.find("magic")
 
 

@@ -12,7 +12,7 @@ time is the one by u over h^o. All tables are computed in rationals and rounded 
 
 from fractions import Fraction
 from functools import lru_cache
-from math import perm
+from math import factorial, perm, sqrt
 
 import numpy as np
 
@@ -81,13 +81,19 @@ def energy(degree: int, order: int) -> np.ndarray:
 def energy_roots(degree: int, order: int) -> np.ndarray:
     """(N+1, N+1) R with: integral over u of (d^order p / du^order)^2 = |R y|^2, for `energy`.
 
-    It has N+1 - order rows that are not zero.
+    Row j < N+1 - order holds the part of the derivative along Legendre polynomial j; the others are
+    zero.
     """
     size, count = degree + 1, degree + 1 - order
-    scales = np.array([_falling(i, order) for i in range(order, size)], dtype=float)
-    moments = np.linalg.cholesky(1.0 / (1.0 + np.add.outer(np.arange(count), np.arange(count))))
+    derived = [[_falling(i, order) * c[i] for i in range(order, size)] for c in _columns(degree)]
     roots = np.zeros((size, size))
-    roots[:count] = moments.T @ (scales[:, None] * to_monomials(degree)[order:])
+    for j in range(count):  # the integral of u^i times the polynomial
+        along = [
+            Fraction(factorial(i) ** 2, factorial(i - j) * factorial(i + j + 1))
+            if i >= j else Fraction(0)
+            for i in range(count)
+        ]
+        roots[j] = sqrt(2 * j + 1) * np.array([float(_dot(row, along)) for row in derived])
     return roots
 
 

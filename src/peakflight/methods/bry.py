@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from peakflight.certificate import peak_ratios
+from peakflight.certificate import stretch_to_limits
 from peakflight.errors import Status
 from peakflight.methods import Outcome, require
 from peakflight.methods.least_effort import (
@@ -20,7 +20,7 @@ from peakflight.methods.least_effort import (
     first_times,
     kernels_for,
 )
-from peakflight.methods.scaling import estimated_stretch, finish
+from peakflight.methods.scaling import LONGEST, finish
 from peakflight.problem import Problem
 from peakflight.result import History
 from peakflight.spline import SplineTask
@@ -55,11 +55,12 @@ class Settings(DescentSettings):
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A c_t, its optimum, and how much longer the times would have to be for the limits."""
+    """A c_t and its optimum."""
 
     penalty: float
     found: Descended
     stretch: float
+    """Of its path, that the limits ask for: at most 1 if it keeps them."""
 
 
 def kernels(problem: Problem, settings: Settings) -> str:
@@ -72,15 +73,14 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     """Descend at the given c_t, or at the one that reaches a limit; then the exact stretch."""
     task = SplineTask.of(problem.waypoints, problem.spline_class, problem.fixed)
     start = first_times(problem, task)
-    trials: list[Trial] = []
     if settings.time_penalty is None:
-        best = _raise_penalty(problem, task, start, settings, trials)
-        outcome = finish(problem, task, best.found.times, status=best.found.status)
+        trials = _raise_penalty(problem, task, start, settings)
+        best = trials[-1].found
+        outcome = finish(problem, task, best.times, status=best.status)
     else:
-        best = _at_given_penalty(problem, task, start, settings)
-        trials.append(best)
-        outcome = _kept(problem, task, best)
-    road = np.concatenate((start[None], *(trial.found.road for trial in trials)))
+        trials = [_at_given_penalty(problem, task, start, settings)]
+        outcome = _kept(problem, task, trials[0])
+    road = np.concatenate([trial.found.road for trial in trials])
     iterations = sum(trial.found.iterations for trial in trials)
     rows = max(settings.history_size // len(start), 1)
     return replace(outcome, iterations=iterations, history=History(segment_times=road[:rows]))
@@ -91,7 +91,7 @@ def _at_given_penalty(
 ) -> Trial:
     """The optimum for the c_t of the settings, from the scale at which it is near."""
     assert settings.time_penalty is not None
-    price = descend(task, times, settings, penalty=None, iterations=0).price
+    price = _evaluate(task, times, settings).price
     if price > 0.0:  # falls with the power 2r of the scale
         order = problem.spline_class.cost_order
         times = times * (price / settings.time_penalty) ** (1.0 / (2.0 * order))
@@ -101,7 +101,7 @@ def _at_given_penalty(
 def _kept(problem: Problem, task: SplineTask, best: Trial) -> Outcome:
     """The optimum as it is; slowed down, and that is said, only if it exceeds a limit."""
     trajectory = task.solve(best.found.times)
-    if np.nanmax(peak_ratios(trajectory, problem.limits)) <= 1.0:
+    if best.stretch <= 1.0:
         return Outcome(status=best.found.status, trajectory=trajectory)
     outcome = finish(problem, task, best.found.times, status=best.found.status)
     if outcome.status is Status.INFEASIBLE:
@@ -115,34 +115,35 @@ def _kept(problem: Problem, task: SplineTask, best: Trial) -> Outcome:
 
 
 def _raise_penalty(
-    problem: Problem, task: SplineTask, times: np.ndarray, settings: Settings, trials: list[Trial]
-) -> Trial:
-    """The optimum whose largest peak is within closeness of its limit; all trials are noted.
+    problem: Problem, task: SplineTask, times: np.ndarray, settings: Settings
+) -> list[Trial]:
+    """Optima for one c_t after the other, the best at the end.
 
-    If there is none, the nearest below the limits, or else the nearest above.
+    That is one whose path could be flown faster by closeness at most; if there is none, the most
+    aggressive within the limits; if none is, the nearest to them.
     """
     aim = 1.0 - 0.5 * settings.closeness
-    slow: Trial | None = None  # the most aggressive that keeps every limit
-    fast: Trial | None = None  # the least aggressive that does not
-    first = descend(task, times, settings, penalty=None, iterations=0)
+    longest = LONGEST * times.sum()
+    trials: list[Trial] = []
+    slow: Trial | None = None  # the last that keeps every limit
+    fast: Trial | None = None  # the last that does not
+    first = _evaluate(task, times, settings)
     penalty = first.price if first.price > 0.0 else first.effort / times.sum()
-    while len(trials) < ROUNDS:
+    while len(trials) < ROUNDS and times.sum() < longest:
         last = _attempt(problem, task, times, settings, penalty)
         trials.append(last)
-        if last.stretch <= 1.0:
+        if last.stretch > 1.0:
+            fast = last
+        else:
             slow = last
             if last.stretch >= 1.0 - settings.closeness:
                 break
-        else:
-            fast = last
         if slow is None or fast is None:
-            factor = min(max(last.stretch / aim, 1.0 / FACTOR), FACTOR)
-            times = last.found.times * factor
-            price = descend(task, times, settings, penalty=None, iterations=0).price
-            onwards = FACTOR if fast is None else 1.0 / FACTOR
-            penalty = price if (price - last.penalty) * (onwards - 1.0) > 0.0 else 0.0
-            if penalty <= 0.0:
-                times, penalty = last.found.times, last.penalty * onwards
+            times = last.found.times * min(max(last.stretch / aim, 1.0 / FACTOR), FACTOR)
+            penalty = _evaluate(task, times, settings).price
+            if not (penalty > last.penalty if fast is None else 0.0 < penalty < last.penalty):
+                times = last.found.times
+                penalty = last.penalty * (FACTOR if fast is None else 1.0 / FACTOR)
         elif fast.penalty <= slow.penalty * (1.0 + NARROW):
             break
         else:
@@ -150,13 +151,18 @@ def _raise_penalty(
             share = min(max(share, EDGE), 1.0 - EDGE)
             times = slow.found.times * (fast.found.times / slow.found.times) ** share
             penalty = slow.penalty * (fast.penalty / slow.penalty) ** share
-    return slow or fast  # type: ignore[return-value]
+    best = slow or min(trials, key=lambda trial: trial.stretch)
+    return [*(trial for trial in trials if trial is not best), best]
+
+
+def _evaluate(task: SplineTask, times: np.ndarray, settings: Settings) -> Descended:
+    """Cost and gradient where the times are."""
+    return descend(task, times, settings, penalty=None, iterations=0)
 
 
 def _attempt(
     problem: Problem, task: SplineTask, times: np.ndarray, settings: Settings, penalty: float
 ) -> Trial:
-    rows = settings.history_size // len(times)
-    found = descend(task, times, settings, penalty=penalty, rows=rows)
-    ratios = peak_ratios(task.solve(found.times), problem.limits)
-    return Trial(penalty, found, estimated_stretch(ratios))
+    found = descend(task, times, settings, penalty=penalty)
+    stretched = stretch_to_limits(task.solve(found.times), problem.limits)
+    return Trial(penalty, found, np.inf if stretched is None else stretched[1])

@@ -45,7 +45,7 @@ class Descended:
     """(K,) df/dt."""
     iterations: int
     road: np.ndarray
-    """(n, K) s, after each of the first n iterations."""
+    """(n, K) s, where it began and after each of the first iterations."""
     status: Status
 
     @property
@@ -61,21 +61,20 @@ def descend(
     *,
     penalty: float | None,
     iterations: int | None = None,
-    rows: int = 0,
 ) -> Descended:
     """Minimise J (Eq. BryOpt) from the given times, or f at their total (Eq. timecost).
 
-    penalty: c_t; None keeps the total. iterations: instead of those of the settings; rows: most of
-    them kept.
+    penalty: c_t; None keeps the total. iterations: instead of those of the settings.
     """
-    times = times.copy()
+    begin, times = times, times.copy()
     count, spline_class = len(times), task.spline_class
     orders = np.flatnonzero(spline_class.weights)
     weights = np.array(spline_class.weights)[orders]
     roots = np.array([basis.energy_roots(spline_class.degree, int(order)) for order in orders])
+    rows = settings.history_size // count - 1
     longest = settings.iterations if iterations is None else iterations
     gradient = np.full(count, np.nan)
-    road = np.empty((min(rows, longest), count))
+    road = np.empty((max(min(rows, longest), 0), count))
     value, remaining, done, stalled = effort.descend(
         task.rows, task.waypoints, task.simple, task.layered, times, (orders, weights, roots),
         penalty or 0.0, penalty is None, settings.tolerance, longest,
@@ -86,7 +85,8 @@ def descend(
         status = Status.ITERATION_LIMIT
         if stalled or not value < np.inf:
             status = Status.SOLVED if remaining <= ROUNDING else Status.NO_PROGRESS
-    return Descended(times, value, gradient, done, road[:done], status)
+    road = np.concatenate((begin[None], road[:done]))
+    return Descended(times, value, gradient, done, road, status)
 
 
 def first_times(problem: Problem, task: SplineTask) -> np.ndarray:

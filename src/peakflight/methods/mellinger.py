@@ -7,8 +7,6 @@ stretch, are the same whatever the total. With a moving start or end or a mixed 
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from peakflight.methods import Outcome
 from peakflight.methods.least_effort import DescentSettings, descend, first_times, kernels_for
 from peakflight.methods.scaling import finish
@@ -32,8 +30,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     """Descend at a fixed total, then stretch until every limit holds."""
     task = SplineTask.of(problem.waypoints, problem.spline_class, problem.fixed)
     start = first_times(problem, task)
-    rows = max(settings.history_size // len(start) - 1, 0)
-    found = descend(task, start, settings, penalty=None, rows=rows)
+    found = descend(task, start, settings, penalty=None)
     outcome = finish(problem, task, found.times, status=found.status)
-    road = np.concatenate((start[None], found.road))
-    return replace(outcome, iterations=found.iterations, history=History(segment_times=road))
+    history = History(segment_times=found.road)
+    return replace(outcome, iterations=found.iterations, history=history)
