@@ -28,10 +28,12 @@ LOOKS: tuple[tuple[str, Any, float], ...] = (
     ("#8a8a8a", SOLID, 1.6),
     ("#e08a00", (0, (6, 1.5)), 1.4),
     ("#a0489c", (0, (1.2, 1.2)), 1.4),
-    ("#1b5fb4", SOLID, 1.4),
-    ("#0b6b4f", (0, (4, 1.2, 1.2, 1.2)), 1.4),
+    ("#2f7fd6", SOLID, 1.4),
+    ("#0a4a3a", SOLID, 1.0),
 )
-"""Colour, dashes and width, pt, of methods in the order of `METHODS`: each tells them apart."""
+"""Colour, dashes and width, pt, of methods in the order of `METHODS`."""
+MANY = 40
+"""With more legs than this, lines are thin, and dashes would only fray them."""
 LEGEND_TOP = 0.3
 """From the top of the figure to its legend, in."""
 LEGEND_ROW = 0.165
@@ -74,6 +76,8 @@ class Flight(NamedTuple):
     @property
     def line_style(self) -> dict[str, Any]:
         """As matplotlib's lines take it."""
+        if len(self.pieces) > MANY:
+            return {"color": self.colour, "linestyle": SOLID, "linewidth": 0.5 * self.width}
         return {"color": self.colour, "linestyle": self.dashes, "linewidth": self.width}
 
 

@@ -14,7 +14,7 @@ LEFT, RIGHT, BOTTOM, ABOVE = 0.75, 0.15, 0.45, 0.14
 """Margins, in."""
 HEIGHT = 2.2
 """Of the panel, in."""
-GROUP = 0.82
+GROUP = 0.76
 """Width of the bars of a leg together, relative to the distance between legs."""
 MOST_BARS = 100
 """More are drawn as steps."""
