@@ -718,7 +718,9 @@ def test_the_registry_names_modules_that_solve():
         assert callable(module.solve)
         assert module.kernels(Problem(CORNER, **JERK), module.Settings())
         assert "\n" not in summary
-    with pytest.raises(InvalidProblem, match="unknown method 'magic'; known are proportional, mell"):
+    with pytest.raises(
+        InvalidProblem, match="unknown method 'magic'; known are proportional, mell"
+    ):
         registry.find("magic")
 
 

@@ -25,7 +25,7 @@ from peakflight.trajectory import Trajectory
 
 SOLID = "-"
 LOOKS: tuple[tuple[str, Any, float], ...] = (
-    ("#8a8a8a", SOLID, 1.6),
+    ("#a3a3a3", SOLID, 1.6),
     ("#e08a00", (0, (6, 1.5)), 1.4),
     ("#a0489c", (0, (1.2, 1.2)), 1.4),
     ("#2f7fd6", SOLID, 1.4),

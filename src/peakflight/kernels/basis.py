@@ -90,7 +90,8 @@ def energy_roots(degree: int, order: int) -> np.ndarray:
     for j in range(count):  # the integral of u^i times the polynomial
         along = [
             Fraction(factorial(i) ** 2, factorial(i - j) * factorial(i + j + 1))
-            if i >= j else Fraction(0)
+            if i >= j
+            else Fraction(0)
             for i in range(count)
         ]
         roots[j] = sqrt(2 * j + 1) * np.array([float(_dot(row, along)) for row in derived])
