@@ -402,6 +402,8 @@ def test_limits_round_trip() -> None:
         (("--method", "magic"), "'magic' is not one of"),
         (("--variant", "magic"), "'magic' is not one of"),
         (("--variant", "paper", "--method", "proportional"), "--variant is of method peak"),
+        (("--time-penalty", "1", "--method", "mellinger"), "--time-penalty is of method bry"),
+        (("--time-penalty", "0"), "setting time_penalty is 0.0; it must be from"),
         (("--minimize", "crackle"), "'crackle' is not one of"),
         (("--export", "pdf"), "'pdf' is not one of"),
         (("--degree", "five"), "'five' is not a valid integer"),

@@ -28,6 +28,7 @@ PICTURES = {
 """Name without .png, and what it shows."""
 VARIANTS = ("descent", "paper")
 METHOD_OPTIONS = {
+    "bry": ("time_penalty",),
     "peak": ("variant",),
     "joint": ("pieces", "max_pieces", "effort", "time_limit"),
 }
@@ -58,6 +59,12 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
     type=click.Choice(tuple(METHODS)),
     help="; ".join(f"{name}: {summary}" for name, summary in METHODS.items())
     + f". Default: {DEFAULT_METHOD}, or the method that a given option is of.",
+)
+@click.option(
+    "--time-penalty",
+    type=float,
+    help="Of method bry: weight of the total time beside the effort; by default as much as the "
+    "limits allow.",
 )
 @click.option(
     "--variant",
@@ -101,6 +108,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 def plan(
     course: Path,
     method: str | None,
+    time_penalty: float | None,
     variant: str | None,
     pieces: int | str | None,
     max_pieces: int | None,
@@ -126,6 +134,7 @@ def plan(
       peakflight plan course.csv --limits speed=5,jerk=62,tilt=50deg -o race
     """  # noqa: D301
     tuning = {
+        "time_penalty": time_penalty,
         "variant": variant,
         "pieces": pieces,
         "max_pieces": max_pieces,

@@ -88,11 +88,10 @@ def energy_roots(degree: int, order: int) -> np.ndarray:
     derived = [[_falling(i, order) * c[i] for i in range(order, size)] for c in _columns(degree)]
     roots = np.zeros((size, size))
     for j in range(count):  # the integral of u^i times the polynomial
-        along = [
+        along = [Fraction(0)] * j
+        along += [
             Fraction(factorial(i) ** 2, factorial(i - j) * factorial(i + j + 1))
-            if i >= j
-            else Fraction(0)
-            for i in range(count)
+            for i in range(j, count)
         ]
         roots[j] = sqrt(2 * j + 1) * np.array([float(_dot(row, along)) for row in derived])
     return roots
