@@ -27,7 +27,7 @@ from peakflight.paper import (
     MELLINGER,
     PEAK,
     PRINTED,
-    Comparison,
+    PaperComparison,
     Reproduction,
     reproduce,
 )
@@ -240,7 +240,7 @@ def test_any_number_of_legs(legs: int, tmp_path: Path) -> None:
         method="joint", status="failed", certified=False, message="no <b>reason</b> | at all"
     )
     comparisons = tuple(
-        Comparison(
+        PaperComparison(
             printed=one,
             problem=problem,
             rows={GUESS: row, MELLINGER: row, PEAK: row, ALGORITHM_1: row, JOINT: failed},

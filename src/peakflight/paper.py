@@ -100,7 +100,7 @@ class Beside(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Comparison:
+class PaperComparison:
     """The paper's methods, and two more, under one set of limits."""
 
     printed: Printed
@@ -146,7 +146,7 @@ class Reproduction:
     """Everything that was run."""
 
     course: Course
-    comparisons: tuple[Comparison, ...]
+    comparisons: tuple[PaperComparison, ...]
     """For jerk and for snap."""
 
     @cached_property
@@ -157,7 +157,7 @@ class Reproduction:
         return minimum_effort_spline(self.course.waypoints, times, minimize="jerk", degree=DEGREE)
 
     @property
-    def example(self) -> Comparison:
+    def example(self) -> PaperComparison:
         """The comparison that the paper's example belongs to: for jerk."""
         return self.comparisons[0]
 
@@ -207,7 +207,7 @@ def reproduce(
             if on_stage is not None:
                 on_stage(f"{printed.title.lower()}: {name}")
             rows[name] = run_method(asked, method, settings)
-        comparisons.append(Comparison(printed=printed, problem=problem, rows=rows))
+        comparisons.append(PaperComparison(printed=printed, problem=problem, rows=rows))
     return Reproduction(course=course, comparisons=tuple(comparisons))
 
 
@@ -260,7 +260,7 @@ def leg_times_csv(result: Reproduction) -> str:
     return _csv(("comparison", "leg", *(f"{name} [s]" for name in names)), lines())
 
 
-def _as_dict(one: Comparison) -> dict[str, Any]:
+def _as_dict(one: PaperComparison) -> dict[str, Any]:
     methods = {}
     for name, row in one.rows.items():
         methods[name] = {

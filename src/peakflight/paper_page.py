@@ -31,7 +31,7 @@ from peakflight.paper import (
     JOINT,
     MELLINGER,
     PEAK,
-    Comparison,
+    PaperComparison,
     Reproduction,
     figures_csv,
     leg_times_csv,
@@ -117,7 +117,7 @@ def paper_document(
     )
 
 
-def beside_table(one: Comparison) -> Table:
+def beside_table(one: PaperComparison) -> Table:
     """Every figure that the paper prints of a comparison, beside ours."""
     rows = tuple(
         (figure.quantity, f"{figure.paper:g} {figure.unit}", _figure(figure.ours, figure.unit))
@@ -130,7 +130,7 @@ def beside_table(one: Comparison) -> Table:
     )
 
 
-def methods_table(one: Comparison) -> Table:
+def methods_table(one: PaperComparison) -> Table:
     """What each method made of a comparison."""
     rows = []
     for name, row in one.rows.items():
@@ -227,7 +227,7 @@ def _example_section(result: Reproduction, pictures: tuple[Picture, ...]) -> Sec
     return Section("The example", (text, *pictures))
 
 
-def _comparison_section(one: Comparison, pictures: tuple[Picture, ...]) -> Section:
+def _comparison_section(one: PaperComparison, pictures: tuple[Picture, ...]) -> Section:
     spline = one.problem.spline_class
     text = (
         f"{one.printed.title}, degree {spline.degree}, continuous up to derivative "
@@ -273,14 +273,14 @@ def _reasons(result: Reproduction) -> tuple[str, ...]:
     return tuple(reason.strip() for reason in reasons if reason)
 
 
-def _algorithm_1(one: Comparison) -> str:
+def _algorithm_1(one: PaperComparison) -> str:
     row, best = one.rows[ALGORITHM_1], one.rows[PEAK]
     title = one.printed.title
     if row.duration is None:
         return f"{title}: it has no certified plan ({row.status})."
     met = "met" if row.status == "solved" else "did not meet"
     against = (
-        f", {100.0 * (row.duration / best.duration - 1.0):+.3g} % against `peak`"
+        f", {100.0 * (row.duration / best.duration - 1.0):+.1f} % against `peak`"
         if best.duration
         else ""
     )
@@ -290,9 +290,9 @@ def _algorithm_1(one: Comparison) -> str:
     )
 
 
-def _mellinger(one: Comparison) -> str:
+def _mellinger(one: PaperComparison) -> str:
     guess, found = one.plans.get(GUESS), one.plans.get(MELLINGER)
-    if guess is None or found is None:
+    if guess is None or found is None or len(guess.pieces) == 1:
         return ""
     shares = [np.diff(plan.waypoint_times) / plan.duration for plan in (guess, found)]
     leg = int(np.abs(shares[1] - shares[0]).argmax())
@@ -304,29 +304,30 @@ def _mellinger(one: Comparison) -> str:
     )
 
 
-def _joint(one: Comparison) -> str:
+def _joint(one: PaperComparison) -> str:
     row, best = one.rows[JOINT], one.rows[PEAK]
     if row.plan is None or row.duration is None or best.duration is None:
         return ""
     return (
         f"{one.printed.title}: {row.duration:.4g} s in {row.pieces} polynomials of degree "
-        f"{row.plan.trajectory.degree}, {100.0 * (row.duration / best.duration - 1.0):+.3g} % "
+        f"{row.plan.trajectory.degree}, {100.0 * (row.duration / best.duration - 1.0):+.1f} % "
         "against `peak`."
     )
 
 
-def _speed(one: Comparison) -> str:
+def _speed(one: PaperComparison) -> str:
     """Which of the paper's methods reach the limit of speed, so that no gain is left between."""
     reached = [name for name in COMPARED if "speed" in one.rows[name].binding]
-    if len(reached) < 2:
+    if len(reached) < 2 or not one.printed.speed_gains:
         return ""
     return (
-        f"{one.printed.title}: {' and '.join(reached)} both reach the limit of speed here, "
-        f"{one.printed.limits.speed:g} m/s, which leaves no gain in top speed between them."
+        f"{one.printed.title}: more than one method reaches the limit of speed here, "
+        f"{one.printed.limits.speed:g} m/s ({', '.join(reached)}), which leaves no gain in top "
+        "speed between them."
     )
 
 
-def _difference(one: Comparison, name: str, other: str) -> str:
+def _difference(one: PaperComparison, name: str, other: str) -> str:
     reduction = one.reduction(name, other)
     return NONE if reduction is None or name == other else f"{-reduction:+.1f} %"
 

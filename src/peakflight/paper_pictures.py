@@ -16,7 +16,7 @@ from peakflight.figures import (
     segment_times_figure,
     side_by_side,
 )
-from peakflight.paper import ALGORITHM_1, GUESS, PEAK, Comparison, Reproduction
+from peakflight.paper import ALGORITHM_1, GUESS, PEAK, PaperComparison, Reproduction
 from peakflight.result import History, Plan
 from peakflight.spline import SplineTask
 
@@ -81,7 +81,7 @@ def example_pictures(result: Reproduction) -> Iterator[Drawn]:
         )
 
 
-def comparison_pictures(one: Comparison) -> Iterator[Drawn]:
+def comparison_pictures(one: PaperComparison) -> Iterator[Drawn]:
     """Draw a comparison: its part of Figs. TrajSim, DerSim and SegTimeSim."""
     if not one.plans:
         return
