@@ -46,6 +46,15 @@ def test_every_figure_of_every_case_is_legible(waypoints):
             assert f"{name}, " in said
 
 
+def test_names_of_users_are_written_as_they_are():
+    name = "a_$x^$ & {b}\\" + "long " * 40 + "$"
+    for figure in comparison_figures({"peak": make_plan(TWISTY)}, title=name).values():
+        assert_legible(figure)
+    figure = differences_figure([name], {"peak": [-5.0]}, title=name, axis="percent")
+    assert_legible(figure)
+    assert name[-20:] in " ".join(words(figure))
+
+
 def test_a_single_plan_is_drawn():
     for figure in comparison_figures({"peak": make_plan(TWISTY)}, title="alone").values():
         assert_legible(figure)

@@ -25,6 +25,8 @@ TEXT = 8.0
 """Size of all lettering but the headline, pt."""
 HEADLINE = 9.5
 """Size of the headline, pt."""
+LONGEST_TITLE = 80
+"""Characters of a headline."""
 CHARACTER = 0.6
 """Width of a character, relative to the size of the type; on the safe side for digits."""
 POWERS = (-4, 5)
@@ -75,16 +77,17 @@ def write_headline(figure: Figure, plan: Plan, left: float, title: str | None = 
 
 
 def write_title(figure: Figure, text: str, left: float) -> None:
-    """Write what a figure shows on top of it, from `left` inches on."""
+    """Write what a figure shows on top of it, from `left` inches on; its end, if it is too long."""
     across, up = figure.get_size_inches()
     figure.suptitle(
-        text,
+        shortened(text, LONGEST_TITLE),
         x=left / across,
         y=1.0 - 0.07 / up,
         ha="left",
         va="top",
         fontsize=HEADLINE,
         color=INK,
+        parse_math=False,  # it may hold a name that a user chose
     )
 
 
@@ -118,6 +121,11 @@ def seconds(duration: float) -> str:
     """Print a time to four figures, with its unit."""
     decimals = max(0, 3 - math.floor(math.log10(duration))) if duration > 0.0 else 0
     return f"{duration:.{min(decimals, 6)}f} s"
+
+
+def shortened(text: str, most: int) -> str:
+    """Leave out the beginning of a text of more than `most` characters."""
+    return text if len(text) <= most else "…" + text[1 - most :]
 
 
 def even_step(count: int, most: int) -> int:

@@ -18,6 +18,7 @@ from peakflight.figures.canvas import (
     add_axes,
     even_step,
     new_figure,
+    shortened,
     text_width,
     write_title,
 )
@@ -48,7 +49,7 @@ def differences_figure(
     axis
         What the figures are.
     """
-    names = [_shortened(name) for name in courses]
+    names = [shortened(name, LONGEST_NAME) for name in courses]
     left = 0.25 + max(map(text_width, names)) / POINTS
     height = min(ROW * max(len(names), 3), MOST)
     figure = new_figure(LEGEND + height + BOTTOM)
@@ -78,7 +79,7 @@ def differences_figure(
     axes.set_ylim(len(names) - 0.5, -0.5)
     most = max(int(POINTS * height / (1.25 * TEXT)), 1)
     shown = rows[:: even_step(len(names), most)]
-    axes.set_yticks(shown, [names[row] for row in shown])
+    axes.set_yticks(shown, [names[row] for row in shown], parse_math=False)
     axes.tick_params(axis="y", length=0.0)
     axes.margins(x=0.03)
     axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
@@ -101,7 +102,3 @@ def differences_figure(
         borderpad=0.0,
     )
     return figure
-
-
-def _shortened(name: str) -> str:
-    return name if len(name) <= LONGEST_NAME else "…" + name[1 - LONGEST_NAME :]
