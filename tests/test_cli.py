@@ -18,11 +18,12 @@ import peakflight as pf
 import peakflight.planner
 from peakflight.cli.application import application
 from peakflight.cli.folder import folder_for
-from peakflight.cli.options import PAPER_LIMITS, parse_limits, written
+from peakflight.cli.options import parse_limits, written
 from peakflight.cli.output import ranges, seconds
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
 from peakflight.formats import FLIGHT_WRITERS
+from peakflight.limits import PAPER_LIMITS
 from peakflight.methods import METHODS
 
 Run = Callable[..., Result]

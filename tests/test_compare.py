@@ -333,10 +333,19 @@ class TestCommand:
         assert "Medians over 2 courses" in result.stdout
         assert "…" not in result.stdout
         assert max(map(len, result.stdout.splitlines())) <= 80
+        pictures = {
+            f"{course}-{kind}.png"
+            for course in ("lap", "far")
+            for kind in ("paths", "derivatives", "leg-times")
+        }
         assert {path.name for path in (folder / "new" / "out").iterdir()} == {
             "compare.csv",
             "compare.json",
+            "compare.png",
+            *pictures,
         }
+        for name in (*pictures, "compare.png"):
+            assert (folder / "new" / "out" / name).read_bytes().startswith(b"\x89PNG")
         values = json.loads((folder / "new" / "out" / "compare.json").read_text())
         assert values["methods"] == ["peak", "proportional"]
         assert [one["course"] for one in values["courses"]] == ["lap", "far"]
@@ -365,6 +374,43 @@ class TestCommand:
         (folder / "other" / "lap.csv").write_text((folder / "far.csv").read_text())
         values = json.loads(run("lap.csv", "other/lap.csv", "--json").stdout)
         assert [one["course"] for one in values["courses"]] == ["lap.csv", "other/lap.csv"]
+
+        done = run("lap.csv", "other/lap.csv", "--methods", "proportional", "-o", "out", "--json")
+        names = {Path(path).name for path in json.loads(done.stdout)["files"].values()}
+        assert {"lap.csv-paths.png", "other-lap.csv-paths.png", "compare.png"} < names
+        assert names == {path.name for path in (folder / "out").iterdir()}
+
+    def test_names_that_become_one_do_not_share_a_file(self, run: Run, folder: Path) -> None:
+        for name in ("a b.csv", "a-b.csv", "A-b.csv"):
+            (folder / name).write_text((folder / "lap.csv").read_text())
+        run("a b.csv", "a-b.csv", "A-b.csv", "--methods", "proportional", "-o", "out")
+        names = {path.name for path in (folder / "out").iterdir()}
+        assert {"a-b-paths.png", "a-b-2-paths.png", "A-b-3-paths.png"} < names
+
+    def test_without_figures(self, run: Run, folder: Path) -> None:
+        result = run("lap.csv", "--methods", "proportional", "--no-figures", "-o", "out")
+        assert result.exit_code == 0
+        assert {path.name for path in (folder / "out").iterdir()} == {"compare.csv", "compare.json"}
+
+    def test_without_matplotlib(
+        self, run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for name in [name for name in sys.modules if name.startswith("peakflight.figures")]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.setitem(sys.modules, "matplotlib", None)
+        result = run("lap.csv", "--methods", "proportional", "-o", "out")
+        assert result.exit_code == 0
+        assert "note: no pictures: figures need matplotlib" in result.stdout
+        assert {path.name for path in (folder / "out").iterdir()} == {"compare.csv", "compare.json"}
+
+    def test_a_course_without_a_plan_has_no_pictures(
+        self, run: Run, folder: Path, broken: Callable[[Exception], str]
+    ) -> None:
+        broken(ZeroDivisionError("deep inside"))
+        result = run("lap.csv", "--methods", "broken", "-o", "out")
+        assert result.exit_code == 1
+        assert "note: no pictures of lap: no method has a certified plan" in result.stdout
+        assert {path.name for path in (folder / "out").iterdir()} == {"compare.csv", "compare.json"}
 
     def test_notes_on_courses(self, run: Run, folder: Path) -> None:
         text = "t,x,y,z\n0,0,0,1\n1,1,0,1\n2,1,0,1.0004\n3,2,0,1\n"

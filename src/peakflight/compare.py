@@ -194,7 +194,7 @@ def compare(
     rows = {}
     for method in dict.fromkeys((*methods, BASELINE)):
         tell(method)
-        rows[method] = _row(problem, method, settings.get(method))
+        rows[method] = run_method(problem, method, settings.get(method))
     found = None
     if bound:
         tell("bound")
@@ -209,6 +209,42 @@ def compare(
         rows=tuple(_measured(rows[method], baseline, found) for method in methods),
         proportional=baseline,
         bound=found,
+    )
+
+
+def run_method(problem: Problem, method: str, settings: Any = None) -> Row:
+    """Answer a problem by one method, without the figures that depend on others.
+
+    Whatever goes wrong is a row that says so.
+    """
+    began = time.process_time()
+    try:
+        answer = plan(problem, method=method, settings=settings)
+    except PeakflightError as error:
+        return Row(method=method, status=REFUSED, certified=False, message=str(error))
+    except Exception as error:  # a comparison goes on without the method
+        message = f"unexpected {type(error).__name__}: {error}; this is a bug, please report it"
+        return Row(method=method, status=FAILED, certified=False, message=message)
+    row = Row(
+        method=method,
+        status=str(answer.status),
+        certified=answer.feasible,
+        iterations=answer.iterations,
+        cpu_time_s=time.process_time() - began,
+        message=answer.message,
+        plan=answer,
+    )
+    if not answer.feasible:
+        return row
+    length = path_length(answer.trajectory)
+    return replace(
+        row,
+        duration=answer.duration,
+        top_speed=float(peak_ratios(answer.trajectory, Limits(speed=1.0))[:, 0].max()),
+        mean_speed=length / answer.duration,
+        path_length=length,
+        binding=tuple(n for n, kappa in answer.report.peaks.items() if kappa.max() >= BINDING),
+        pieces=len(answer.trajectory),
     )
 
 
@@ -237,7 +273,7 @@ def warm_up(problem: Problem, methods: Sequence[str] | None = None) -> None:
         yaw = None if problem.yaw is None else problem.yaw[: legs + 1]
         problem = replace(problem, waypoints=problem.waypoints[: legs + 1], yaw=yaw)
     for method in dict.fromkeys((*check_methods(methods), BASELINE)):
-        _row(problem, method, None)
+        run_method(problem, method, None)
 
 
 def summarise(comparisons: Sequence[Comparison]) -> tuple[Summary, ...]:
@@ -295,39 +331,6 @@ _COLUMNS = (
     "bound [s]",
     "message",
 )
-
-
-def _row(problem: Problem, method: str, settings: Any) -> Row:
-    """Run a method; figures that depend on others come later."""
-    began = time.process_time()
-    try:
-        answer = plan(problem, method=method, settings=settings)
-    except PeakflightError as error:
-        return Row(method=method, status=REFUSED, certified=False, message=str(error))
-    except Exception as error:  # a comparison goes on without the method
-        message = f"unexpected {type(error).__name__}: {error}; this is a bug, please report it"
-        return Row(method=method, status=FAILED, certified=False, message=message)
-    row = Row(
-        method=method,
-        status=str(answer.status),
-        certified=answer.feasible,
-        iterations=answer.iterations,
-        cpu_time_s=time.process_time() - began,
-        message=answer.message,
-        plan=answer,
-    )
-    if not answer.feasible:
-        return row
-    length = path_length(answer.trajectory)
-    return replace(
-        row,
-        duration=answer.duration,
-        top_speed=float(peak_ratios(answer.trajectory, Limits(speed=1.0))[:, 0].max()),
-        mean_speed=length / answer.duration,
-        path_length=length,
-        binding=tuple(n for n, kappa in answer.report.peaks.items() if kappa.max() >= BINDING),
-        pieces=len(answer.trajectory),
-    )
 
 
 def _measured(row: Row, baseline: float | None, bound: Bound | None) -> Row:

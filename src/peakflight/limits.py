@@ -178,6 +178,13 @@ def keeps(name: str, value: float, limit: float) -> bool:
     return value >= limit if name.startswith("least_") else value <= limit
 
 
+def plain_unit(unit: str) -> str:
+    """Write a unit as it is printed: m/s² for m/s^2."""
+    for power, raised in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
+        unit = unit.replace(power, raised)
+    return unit
+
+
 def _turn(thrust: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """|F x y| / F.F of (..., 3) arrays; in free fall, where it has no value, infinite."""
     square = (thrust * thrust).sum(axis=-1)
@@ -198,3 +205,7 @@ def _positive(name: str, value: Any) -> float:
             f"limit {name} is {number:g}; it must be from {SMALLEST:g} to {LARGEST:g}"
         )
     return number
+
+
+PAPER_LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+"""What the paper's minimum-jerk trajectories keep; commands take it where no limits are given."""

@@ -26,6 +26,7 @@ from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
 from peakflight.cli.output import print_json
+from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
 from peakflight.errors import PeakflightError
 
@@ -102,6 +103,7 @@ def application(context: click.Context) -> int:
 application.add_command(plan)
 application.add_command(check)
 application.add_command(compare)
+application.add_command(paper)
 
 
 def _report(error: Exception, arguments: Sequence[str]) -> int:

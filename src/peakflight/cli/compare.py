@@ -10,13 +10,13 @@ import click
 
 from peakflight.cli.compare_output import print_comparisons
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
-from peakflight.cli.folder import OutputFolder
-from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option, spline_options
+from peakflight.cli.folder import OutputFolder, file_name
+from peakflight.cli.options import common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.progress import Progress
-from peakflight.errors import InvalidFile, InvalidProblem
+from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
 from peakflight.files import write_atomically
-from peakflight.limits import Limits
+from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import METHODS
 from peakflight.problem import Problem
 from peakflight.version import __version__
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from peakflight.compare import Comparison, Summary
 
 TABLE_FILE, DATA_FILE = "compare.csv", "compare.json"
+DIFFERENCES_FILE = "compare.png"
+"""A picture of several courses together."""
 
 
 def _methods(
@@ -57,12 +59,13 @@ def _methods(
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
+@click.option("--no-figures", is_flag=True, help="With -o, draw no pictures.")
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help=f"Folder for {TABLE_FILE} and {DATA_FILE}; by default none is written.",
+    help=f"Folder for {TABLE_FILE}, {DATA_FILE} and the pictures; by default none is written.",
 )
 @common_options
 def compare(
@@ -74,6 +77,7 @@ def compare(
     degree: int | None,
     continuity: int | None,
     strict: bool,
+    no_figures: bool,
     output: Path | None,
     as_json: bool,
 ) -> int:
@@ -105,6 +109,7 @@ def compare(
             )
         names = _distinct(names, courses)
         files: dict[str, Path] = {}
+        remarks: tuple[str, ...] = ()
         if output is None:
             comparisons = _compare(names, problems, methods, bound, progress)
             values = _values(comparisons, courses, notes)
@@ -113,8 +118,12 @@ def compare(
                 comparisons = _compare(names, problems, methods, bound, progress)
                 values = _values(comparisons, courses, notes)
                 files = _write(comparisons, values, folder)
+                if not no_figures:
+                    drawn, remarks = _draw(comparisons, folder, progress)
+                    files = {**files, **drawn}
     if as_json:
-        print_json({**values, "files": {name: str(path) for name, path in files.items()}})
+        shown = {name: str(path) for name, path in files.items()}
+        print_json({**values, "files": shown, "notes": list(remarks)})
     else:
         print_comparisons(
             comparisons,
@@ -123,6 +132,7 @@ def compare(
             default_limits=limits is None,
             folder=output,
             files=files,
+            remarks=remarks,
         )
     without = [one.name for one in comparisons if one.fastest is None]
     if without:
@@ -209,3 +219,44 @@ def _write(
     text = json.dumps(values, allow_nan=False, indent=1, ensure_ascii=False) + "\n"
     write_atomically(folder.stage / DATA_FILE, text)
     return {"table": folder.published(TABLE_FILE), "data": folder.published(DATA_FILE)}
+
+
+def _draw(
+    comparisons: Sequence["Comparison"], folder: OutputFolder, progress: Progress
+) -> tuple[dict[str, Path], tuple[str, ...]]:
+    """Draw each course, and several courses together; what keeps pictures from being drawn."""
+    try:
+        from peakflight.figures import comparison_figures, differences_figure, write_figure
+    except MissingExtra as error:
+        return {}, (f"no pictures: {error}",)
+    files, remarks = {}, []
+    stems: Counter[str] = Counter()
+    for one in comparisons:
+        progress.stage(f"drawing {one.name}")
+        stem = file_name(one.name)
+        stems[stem.lower()] += 1  # some systems do not tell small letters from large ones
+        if stems[stem.lower()] > 1:
+            stem = f"{stem}-{stems[stem.lower()]}"
+        plans = {row.method: row.plan for row in one.rows if row.certified and row.plan is not None}
+        if not plans:
+            remarks.append(f"no pictures of {one.name}: no method has a certified plan")
+            continue
+        for name, figure in comparison_figures(plans, title=one.name).items():
+            file = f"{stem}-{name}.png"
+            write_figure(figure, folder.stage / file)
+            files[f"{stem}-{name}"] = folder.published(file)
+    if len(comparisons) > 1:
+        methods = [row.method for row in comparisons[0].rows]
+        values = {
+            method: [one.rows[place].against_proportional for one in comparisons]
+            for place, method in enumerate(methods)
+        }
+        figure = differences_figure(
+            [one.name for one in comparisons],
+            values,
+            title="Total time of each method on each course",
+            axis="against proportional",
+        )
+        write_figure(figure, folder.stage / DIFFERENCES_FILE)
+        files["differences"] = folder.published(DIFFERENCES_FILE)
+    return files, tuple(remarks)

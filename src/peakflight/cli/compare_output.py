@@ -23,6 +23,7 @@ def print_comparisons(
     default_limits: bool,
     folder: Path | None,
     files: Mapping[str, Path],
+    remarks: Sequence[str],
 ) -> None:
     """Print two tables a course, medians, and where the files are.
 
@@ -32,6 +33,8 @@ def print_comparisons(
         Medians over the courses; none for a single one.
     notes
         About each course.
+    remarks
+        About the files.
     """
     out = Printout()
     problem = comparisons[0].problem
@@ -45,11 +48,32 @@ def print_comparisons(
     if folder is not None:
         out.line()
         out.path(f"wrote to {folder}:")
-        out.pairs((path.name, _SUMMARIES[name]) for name, path in files.items())
+        out.pairs(_described(files))
+    for remark in remarks:
+        out.line(f"note: {remark}")
     out.show()
 
 
-_SUMMARIES = {"table": "a line for each course and method", "data": "the same and more, as JSON"}
+def _described(files: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
+    """Names of files and what they are; pictures of courses by their endings."""
+    for name, path in files.items():
+        if name in _SUMMARIES:
+            yield path.name, _SUMMARIES[name]
+    kinds = [kind for kind in _PICTURES if any(name.endswith(f"-{kind}") for name in files)]
+    for kind in kinds:
+        yield f"*-{kind}.png", _PICTURES[kind]
+
+
+_SUMMARIES = {
+    "table": "a line for each course and method",
+    "data": "the same and more, as JSON",
+    "differences": "percent against proportional, by method and course",
+}
+_PICTURES = {
+    "paths": "of each course: the trajectories",
+    "derivatives": "of each course: what is limited, against time",
+    "leg-times": "of each course: how the time is shared out",
+}
 
 
 def _print_course(out: Printout, one: "Comparison", notes: Sequence[str]) -> None:

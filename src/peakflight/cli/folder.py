@@ -12,10 +12,10 @@ from peakflight.errors import InvalidFile
 from peakflight.files import PathLike, prepare_folder, reason
 
 LONGEST_NAME = 80
-"""Characters of a course's name in that of its folder."""
+"""Characters of a course's name in that of its folder or files."""
 
 _ODD = re.compile(r"[^\w.+-]+")
-"""What does not belong in the name of a folder on every system."""
+"""What does not belong in the name of a folder or file on every system."""
 
 
 class OutputFolder:
@@ -88,5 +88,9 @@ class OutputFolder:
 
 def folder_for(course: str) -> Path:
     """Where the plan of a course goes unless the user says otherwise: in the current folder."""
-    name = _ODD.sub("-", course).strip("-.")[:LONGEST_NAME]
-    return Path(f"{name or 'course'}-plan")
+    return Path(f"{file_name(course)}-plan")
+
+
+def file_name(course: str) -> str:
+    """What a file or folder of a course may be called on every system."""
+    return _ODD.sub("-", course).strip("-.")[:LONGEST_NAME] or "course"

@@ -9,9 +9,6 @@ import click
 from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, LimitKind, Limits
 
-PAPER_LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
-"""What the paper's experiments keep, and what counts where no limits are given."""
-
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 

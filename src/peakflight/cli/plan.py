@@ -8,13 +8,13 @@ import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import PAPER_LIMITS, common_options, limits_option, spline_options
+from peakflight.cli.options import common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidProblem, MissingExtra
 from peakflight.formats import FLIGHT_WRITERS
-from peakflight.limits import Limits
+from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.result import Plan

@@ -1,4 +1,4 @@
-"""Pictures of a plan: the course, the derivatives against their limits, the segment times.
+"""Pictures of a plan, and of several side by side: paths, what is limited, segment times.
 
 Matplotlib is imported here and nowhere else in the package.
 """
@@ -13,14 +13,29 @@ if find_spec("matplotlib") is None:
         "install it with: pip install 'peakflight[figures]'"
     )
 
+from peakflight.figures.comparison import comparison_figures
 from peakflight.figures.course import course_figure
 from peakflight.figures.derivatives import derivatives_figure
-from peakflight.figures.saving import save_figures
+from peakflight.figures.differences import differences_figure
+from peakflight.figures.flights import Flight, in_sequence, side_by_side
+from peakflight.figures.leg_times import leg_times_figure
+from peakflight.figures.overlaid_derivatives import overlaid_derivatives_figure
+from peakflight.figures.paths import paths_figure
+from peakflight.figures.saving import save_figures, write_figure
 from peakflight.figures.segment_times import segment_times_figure
 
 __all__ = [
+    "Flight",
+    "comparison_figures",
     "course_figure",
     "derivatives_figure",
+    "differences_figure",
+    "in_sequence",
+    "leg_times_figure",
+    "overlaid_derivatives_figure",
+    "paths_figure",
     "save_figures",
     "segment_times_figure",
+    "side_by_side",
+    "write_figure",
 ]

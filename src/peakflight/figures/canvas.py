@@ -25,6 +25,8 @@ TEXT = 8.0
 """Size of all lettering but the headline, pt."""
 HEADLINE = 9.5
 """Size of the headline, pt."""
+LONGEST_TITLE = 80
+"""Characters of a headline."""
 CHARACTER = 0.6
 """Width of a character, relative to the size of the type; on the safe side for digits."""
 POWERS = (-4, 5)
@@ -67,18 +69,25 @@ def add_axes(figure: Figure, left: float, bottom: float, width: float, height: f
     return axes
 
 
-def write_headline(figure: Figure, plan: Plan, left: float) -> None:
-    """Write total time, method and whether the plan is certified, from `left` inches on."""
+def write_headline(figure: Figure, plan: Plan, left: float, title: str | None = None) -> None:
+    """Write total time, method and proof of a plan, or a title, from `left` inches on."""
     proof = "certified" if plan.feasible else f"not certified ({plan.status})"
+    otherwise = f"{seconds(plan.duration)} by method {plan.method}, {proof}"
+    write_title(figure, otherwise if title is None else title, left)
+
+
+def write_title(figure: Figure, text: str, left: float) -> None:
+    """Write what a figure shows on top of it, from `left` inches on; its end, if it is too long."""
     across, up = figure.get_size_inches()
     figure.suptitle(
-        f"{seconds(plan.duration)} by method {plan.method}, {proof}",
+        shortened(text, LONGEST_TITLE),
         x=left / across,
         y=1.0 - 0.07 / up,
         ha="left",
         va="top",
         fontsize=HEADLINE,
         color=INK,
+        parse_math=False,  # it may hold a name that a user chose
     )
 
 
@@ -114,11 +123,9 @@ def seconds(duration: float) -> str:
     return f"{duration:.{min(decimals, 6)}f} s"
 
 
-def plain_unit(unit: str) -> str:
-    """Write a unit as it is printed: m/s² for m/s^2."""
-    for power, raised in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
-        unit = unit.replace(power, raised)
-    return unit
+def shortened(text: str, most: int) -> str:
+    """Leave out the beginning of a text of more than `most` characters."""
+    return text if len(text) <= most else "…" + text[1 - most :]
 
 
 def even_step(count: int, most: int) -> int:

@@ -1,6 +1,7 @@
 """The course from above and from the side, the path coloured by speed."""
 
-from typing import NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -52,18 +53,23 @@ class FlownPath(NamedTuple):
     """(M, 2, 3) m, both ends of each line."""
     speed: np.ndarray
     """(M,) m/s, mean of the speeds at both ends."""
+    style: dict[str, Any] | None = None
+    """How to draw it, as matplotlib's lines take it; None colours it by speed."""
 
     @classmethod
-    def of(cls, trajectory: Trajectory) -> Self:
+    def of(cls, trajectory: Trajectory, style: dict[str, Any] | None = None) -> Self:
         """Sample a trajectory evenly in each piece."""
         count = int(np.clip(LINES // len(trajectory), *PIECE_LINES)) + 1
         points = trajectory.sample(count)
         speed = np.linalg.norm(trajectory.sample(count, 1), axis=-1)
         ends = np.stack((points[:, :-1], points[:, 1:]), axis=2).reshape(-1, 2, 3)
-        return cls(ends, (0.5 * (speed[:, :-1] + speed[:, 1:])).ravel())
+        return cls(ends, (0.5 * (speed[:, :-1] + speed[:, 1:])).ravel(), style)
 
-    def coloured(self, ends: np.ndarray, order: np.ndarray | slice = slice(None)) -> LineCollection:
-        """Colour (M, 2, 2) `ends`, where the lines fall on paper, by speed."""
+    def lines(self, ends: np.ndarray, order: np.ndarray | slice = slice(None)) -> LineCollection:
+        """Draw (M, 2, 2) `ends`, where the lines fall on paper, later ones over earlier ones."""
+        if self.style is not None:  # as one line, or dashes would begin anew at every end
+            whole = np.concatenate((ends[:, 0], ends[-1:, 1]))
+            return LineCollection([whole], zorder=2, capstyle="round", **self.style)
         return LineCollection(
             list(ends[order]),
             array=self.speed[order],
@@ -81,16 +87,11 @@ def course_figure(plan: Plan) -> Figure:
     Waypoints are numbered from 0, the start; a place that is passed several times lists its
     numbers. With many waypoints, round numbers only.
     """
-    path, waypoints = FlownPath.of(plan.trajectory), plan.problem.waypoints
-    extent = np.ptp(np.concatenate((path.ends.reshape(-1, 3), waypoints)), axis=0)
-    shape = float(extent[1] / max(extent[0], 1e-12 * extent.max()))
-    height = float(np.clip(PAPER_WIDTH * shape, *PAPER_HEIGHT))
+    paths, waypoints = [FlownPath.of(plan.trajectory)], plan.problem.waypoints
+    height = paper_height(paths, waypoints)
     figure = new_figure(height + 0.85)
     write_headline(figure, plan, 0.12)
-    above = add_axes(figure, 0.75, 0.45, PAPER_WIDTH, height)
-    _draw_from_above(above, path, waypoints, POINTS * np.array([PAPER_WIDTH, height]))
-    side = add_axes(figure, 3.4, 0.1, SIDE_WIDTH, height + 0.4)
-    lines = _draw_from_side(side, path, waypoints, POINTS * np.array([SIDE_WIDTH, height + 0.4]))
+    lines = draw_views(figure, paths, waypoints, height)
     bar = figure.colorbar(lines, cax=add_axes(figure, 6.43, 0.55, 0.1, height - 0.15))
     bar.ax.ticklabel_format(axis="y", scilimits=BAR_POWERS)
     bar.outline.set_visible(False)
@@ -98,12 +99,40 @@ def course_figure(plan: Plan) -> Figure:
     return figure
 
 
-def _draw_from_above(axes: Axes, path: FlownPath, waypoints: np.ndarray, paper: np.ndarray) -> None:
+def paper_height(paths: Sequence[FlownPath], waypoints: np.ndarray) -> float:
+    """Choose the height of the view from above, in."""
+    extent = np.ptp(_points(paths, waypoints), axis=0)
+    shape = float(extent[1] / max(extent[0], 1e-12 * extent.max()))
+    return float(np.clip(PAPER_WIDTH * shape, *PAPER_HEIGHT))
+
+
+def draw_views(
+    figure: Figure,
+    paths: Sequence[FlownPath],
+    waypoints: np.ndarray,
+    height: float,
+    *,
+    side_width: float = SIDE_WIDTH,
+) -> LineCollection:
+    """Draw paths from above, `height` inches high, and from the side; hand back the last."""
+    above = add_axes(figure, 0.75, 0.45, PAPER_WIDTH, height)
+    _draw_from_above(above, paths, waypoints, POINTS * np.array([PAPER_WIDTH, height]))
+    side = add_axes(figure, 3.4, 0.1, side_width, height + 0.4)
+    return _draw_from_side(side, paths, waypoints, POINTS * np.array([side_width, height + 0.4]))
+
+
+def _points(paths: Sequence[FlownPath], waypoints: np.ndarray) -> np.ndarray:
+    """(n, 3) m, all that is to be seen."""
+    return np.concatenate((*(path.ends.reshape(-1, 3) for path in paths), waypoints))
+
+
+def _draw_from_above(
+    axes: Axes, paths: Sequence[FlownPath], waypoints: np.ndarray, paper: np.ndarray
+) -> None:
     """Draw x and y to one scale on a `paper` of (2,) pt."""
-    ends, places = path.ends[:, :, :2], waypoints[:, :2]
-    flat = np.concatenate((ends.reshape(-1, 2), places))
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    size = np.maximum(high - low, FLAT * np.ptp(path.ends[:, :, 2]))
+    points, places = _points(paths, waypoints), waypoints[:, :2]
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    size = np.maximum(high - low, FLAT * np.ptp(points[:, 2]))
     point = float((size / (paper * (1.0 - 2.0 * BORDER))).max())  # metres to a point on paper
     origin = 0.5 * (low + high) - 0.5 * point * paper
     corner = origin + point * paper
@@ -112,34 +141,38 @@ def _draw_from_above(axes: Axes, path: FlownPath, waypoints: np.ndarray, paper: 
     axes.locator_params(axis="y", nbins=6)
     axes.set_xlabel("x (m)", fontsize=TEXT, color=INK)
     axes.set_ylabel("y (m)", fontsize=TEXT, color=INK)
-    axes.add_collection(path.coloured(ends), autolim=False)
+    for path in paths:
+        axes.add_collection(path.lines(path.ends[:, :, :2]), autolim=False)
     _draw_waypoints(axes, places)
-    labels = waypoint_labels(
-        places, (places - origin) / point, (ends[:, 0] - origin) / point, paper
-    )
+    starts = np.concatenate([path.ends[:, 0, :2] for path in paths])
+    labels = waypoint_labels(places, (places - origin) / point, (starts - origin) / point, paper)
     _write_labels(axes, labels, origin, point)
 
 
 def _draw_from_side(
-    axes: Axes, path: FlownPath, waypoints: np.ndarray, paper: np.ndarray
+    axes: Axes, paths: Sequence[FlownPath], waypoints: np.ndarray, paper: np.ndarray
 ) -> LineCollection:
     """Draw the parallel projection; the units of these axes are points on paper."""
-    view = View.of(np.concatenate((path.ends.reshape(-1, 3), waypoints)), paper)
+    view = View.of(_points(paths, waypoints), paper)
     axes.set(xlim=(0.0, paper[0]), ylim=(0.0, paper[1]), aspect="equal")
     axes.set_axis_off()
     taken = draw_box(axes, view)
-    shadow = view(view.on_floor(np.concatenate((path.ends[:, 0], path.ends[-1:, 1]))))
-    axes.plot(*shadow.T, color="#bdbdbd", linewidth=1.0, zorder=1, solid_joinstyle="round")
+    for path in paths:
+        shadow = view(view.on_floor(np.concatenate((path.ends[:, 0], path.ends[-1:, 1]))))
+        axes.plot(*shadow.T, color="#bdbdbd", linewidth=1.0, zorder=1, solid_joinstyle="round")
     hung = waypoints[:: even_step(len(waypoints), MANY)]
     plumb = view(np.stack((hung, view.on_floor(hung)), axis=1))
     axes.add_collection(
         LineCollection(list(plumb), colors=SOFT, linewidths=0.5, zorder=1.5), autolim=False
     )
-    ends, places = view(path.ends), view(waypoints)
-    lines = path.coloured(ends, np.argsort(view.nearness(path.ends.mean(axis=1))))
-    axes.add_collection(lines, autolim=False)
+    places = view(waypoints)
+    for path in paths:
+        order = np.argsort(view.nearness(path.ends.mean(axis=1)))
+        lines = path.lines(view(path.ends), order)
+        axes.add_collection(lines, autolim=False)
     _draw_waypoints(axes, places)
-    labels = waypoint_labels(waypoints, places, ends[:, 0], paper, taken)
+    starts = np.concatenate([view(path.ends[:, 0]) for path in paths])
+    labels = waypoint_labels(waypoints, places, starts, paper, taken)
     _write_labels(axes, labels, np.zeros(2), 1.0)
     return lines
 

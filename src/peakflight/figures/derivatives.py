@@ -1,6 +1,7 @@
 """What is limited, against time, with the limits."""
 
 import textwrap
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,12 +19,12 @@ from peakflight.figures.canvas import (
     add_axes,
     even_step,
     new_figure,
-    plain_unit,
+    span,
     text_width,
     write_headline,
     write_note,
 )
-from peakflight.limits import KINDS, LARGEST, LimitKind, limited_values
+from peakflight.limits import KINDS, LARGEST, LimitKind, Limits, limited_values, plain_unit
 from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 
@@ -57,31 +58,30 @@ def derivatives_figure(plan: Plan) -> Figure:
     (kappa within 0.1 % of 1), a cross one that exceeds it.
     """
     trajectory, limits = plan.trajectory, plan.problem.limits
-    count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
-    curves = sampled_values(trajectory, count)
-    local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
-    times = trajectory.breakpoints[:-1, None] + local
-    shown = [
-        kind
-        for kind in KINDS
-        if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
-    ]
-    figure = new_figure(BOTTOM + TOP + len(shown) * PANEL + (len(shown) - 1) * GAP)
+    times, curves = sampled_curves(trajectory)
+    kinds = shown_kinds(limits, curves)
+    figure = new_figure(panels_height(kinds) + TOP)
     write_headline(figure, plan, 0.12)
     write_note(figure, KEY, WIDTH - 0.12)
-    panels = []
-    for row, kind in enumerate(reversed(shown)):
-        bottom = BOTTOM + row * (PANEL + GAP)
-        axes = add_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
-        axes.tick_params(labelbottom=row == 0)
-        kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
+    panels = add_panels(figure, kinds)
+    for kind, axes in zip(kinds, panels, strict=True):
+        values = curves[kind.name]
+        axes.plot(times.ravel(), values.ravel(), color=INK, linewidth=1.0, zorder=3)
         limit = getattr(limits, kind.name)
-        _draw_panel(axes, kind, limit, times=times, values=curves[kind.name], kappa=kappa)
+        scale_panel(axes, kind, limit, times=span(times), highest=float(values.max()))
+        if limit is not None:
+            kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
+            _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
         _draw_borders(axes, plan.waypoint_times)
-        panels.append(axes)
-    panels[0].set_xlabel("time (s)", fontsize=TEXT, color=INK)
-    _number_legs(panels[-1], plan.waypoint_times)
+    _number_legs(panels[0], plan.waypoint_times)
     return figure
+
+
+def sampled_curves(trajectory: Trajectory) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """(K, n) s, and name of limit to (K, n): what it limits, densely enough for a curve."""
+    count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
+    local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
+    return trajectory.breakpoints[:-1, None] + local, sampled_values(trajectory, count)
 
 
 def sampled_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
@@ -96,21 +96,53 @@ def sampled_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
     return values
 
 
-def _draw_panel(
+def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind]:
+    """Choose the kinds of limit that get a panel."""
+    return [
+        kind
+        for kind in KINDS
+        if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
+    ]
+
+
+def panels_height(kinds: Sequence[LimitKind]) -> float:
+    """Height of a figure of panels without what stands above them, in."""
+    return BOTTOM + len(kinds) * PANEL + (len(kinds) - 1) * GAP
+
+
+def add_panels(figure: Figure, kinds: Sequence[LimitKind]) -> list[Axes]:
+    """Put a panel for each kind under one another, with one axis of time; the first is on top."""
+    panels = []
+    for row in range(len(kinds)):
+        bottom = BOTTOM + row * (PANEL + GAP)
+        axes = add_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
+        axes.tick_params(labelbottom=row == 0)
+        panels.append(axes)
+    panels[0].set_xlabel("time (s)", fontsize=TEXT, color=INK)
+    return panels[::-1]
+
+
+def scale_panel(
     axes: Axes,
     kind: LimitKind,
     limit: float | None,
     *,
-    times: np.ndarray,
-    values: np.ndarray,
-    kappa: np.ndarray,
+    times: tuple[float, float],
+    highest: float,
 ) -> None:
-    """One curve (K, n) with its limit and the segments whose kappa (K,) reaches it."""
+    """Draw the limit of a panel, name it, and scale the axes to what they show.
+
+    Parameters
+    ----------
+    times
+        First and last, s.
+    highest
+        Of the curves, in the unit of the kind, but tilt in degrees.
+    """
     unit = plain_unit(kind.unit)
     if kind.unit == "rad":
         unit, limit = "°", None if limit is None else float(np.degrees(limit))
-    axes.plot(times.ravel(), values.ravel(), color=INK, linewidth=1.0, zorder=3)
-    top = max(float(values.max()), 1e-12)
+    top = max(highest, 1e-12)
     if limit is not None:
         axes.axhline(limit, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
         far = limit > FAR * top
@@ -126,8 +158,7 @@ def _draw_panel(
             fontsize=TEXT,
             color=LIMIT,
         )
-        _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
-    axes.set(xlim=(times[0, 0], times[-1, -1]), ylim=(0.0, HEADROOM * top))
+    axes.set(xlim=times, ylim=(0.0, HEADROOM * top))
     axes.locator_params(axis="y", nbins=4)
     label = textwrap.fill(kind.label, 14) + f"\n({unit})"
     axes.set_ylabel(label, fontsize=TEXT, color=INK)

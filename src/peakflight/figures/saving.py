@@ -1,7 +1,9 @@
-"""All figures of a plan as files."""
+"""Figures as files."""
 
 from io import BytesIO
 from pathlib import Path
+
+from matplotlib.figure import Figure
 
 from peakflight.errors import InvalidFile
 from peakflight.figures.course import course_figure
@@ -46,8 +48,20 @@ def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[P
     target = prepare_folder(folder)
     paths = []
     for name, draw in FIGURES.items():
-        stream = BytesIO()
-        draw(plan).savefig(stream, format=format)
         paths.append(target / f"{name}.{format}")
-        write_atomically(paths[-1], stream.getvalue())
+        write_figure(draw(plan), paths[-1])
     return paths
+
+
+def write_figure(figure: Figure, path: PathLike) -> bytes:
+    """Write a figure to a file of the kind that the name ends in; hand back what is in it.
+
+    Raises
+    ------
+    InvalidFile
+        If the file cannot be written.
+    """
+    stream = BytesIO()
+    figure.savefig(stream, format=Path(path).suffix.removeprefix("."))
+    write_atomically(path, stream.getvalue())
+    return stream.getvalue()

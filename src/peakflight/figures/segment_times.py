@@ -61,15 +61,17 @@ HATCHES = ("", "////", "....", "xxxx", r"\\\\", "++", "oo", "**")
 _LABELS = {kind.name: kind.label for kind in KINDS}
 
 
-def segment_times_figure(plan: Plan) -> Figure:
+def segment_times_figure(plan: Plan, *, title: str | None = None) -> Figure:
     """Draw the time of each leg by iteration, the total above; without a history, the final times.
 
     The bars of final times show the limit that binds each segment (kappa within 0.1 % of 1). Legs
     are numbered from 0; where a leg has several pieces, its line is their sum and its bar their
-    pile.
+    pile. The headline is `title`, or says total time, method and proof.
     """
     iterations, times = _leg_history(plan)
-    return _lines(plan, iterations, times) if len(iterations) > 1 else _final_times(plan)
+    if len(iterations) > 1:
+        return _lines(plan, iterations, times, title)
+    return _final_times(plan, title)
 
 
 def _leg_history(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
@@ -88,9 +90,9 @@ def _leg_history(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return sound, times[sound]
 
 
-def _lines(plan: Plan, iterations: np.ndarray, times: np.ndarray) -> Figure:
+def _lines(plan: Plan, iterations: np.ndarray, times: np.ndarray, title: str | None) -> Figure:
     figure = new_figure(BOTTOM + LINES + 0.15 + TOTAL + 0.4)
-    write_headline(figure, plan, 0.12)
+    write_headline(figure, plan, 0.12, title)
     width = WIDTH - LEFT - RIGHT
     axes = add_axes(figure, LEFT, BOTTOM, width, LINES)
     if times.shape[1] <= MOST_NAMED:
@@ -189,11 +191,11 @@ def _scale(
         axes.set_ylim(0.0 if from_zero else low - room, high + room)
 
 
-def _final_times(plan: Plan) -> Figure:
+def _final_times(plan: Plan, title: str | None) -> Figure:
     binding = _binding(plan)
     rows = -(-len(binding) // LEGEND_COLUMNS)
     figure = new_figure(BOTTOM + BARS + 0.4 + 0.18 * rows)
-    write_headline(figure, plan, 0.12)
+    write_headline(figure, plan, 0.12, title)
     write_note(figure, "limit that binds each segment", WIDTH - 0.12)
     axes = add_axes(figure, LEFT, BOTTOM, WIDTH - LEFT - 0.15, BARS)
     legs = len(plan.pieces)
