@@ -746,6 +746,21 @@ class TestProgress:
         assert "\x1b" not in stream.getvalue()
         assert logging.getLogger("peakflight").handlers == []
 
+    def test_long_work_has_a_bar(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        stream = Terminal()
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setattr("peakflight.cli.progress.PATIENCE", 0.1)
+        with Progress() as progress:
+            progress.stage("planning")
+            time.sleep(0.5)
+            progress.stage("drawing", 0.25)
+        lines = stream.getvalue().split("\r")
+        assert lines[1].startswith("planning (0.0 s)")
+        unknown = [line for line in lines if line.startswith("[") and "planning" in line]
+        assert all(line[:22].count("#") == 1 for line in unknown)
+        assert len({line[:22] for line in unknown}) >= 2, "it moves"
+        assert any(line.startswith(f"[{'#' * 5}{'.' * 15}] drawing") for line in lines)
+
 
 def test_ranges() -> None:
     assert ranges([]) == "none"

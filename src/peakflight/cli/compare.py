@@ -171,11 +171,12 @@ def _compare(
     progress.stage("loading the methods")
     warm_up(problems[0], methods)
     found = []
-    for count, (name, problem) in enumerate(zip(names, problems, strict=True), start=1):
-        place = f" ({count} of {len(names)})" if len(names) > 1 else ""
+    for done, (name, problem) in enumerate(zip(names, problems, strict=True)):
+        place = f" ({done + 1} of {len(names)})" if len(names) > 1 else ""
+        part = done / len(names) if len(names) > 1 else None
 
-        def stage(text: str, label: str = f"{name}{place}") -> None:
-            progress.stage(f"{label}: {text}")
+        def stage(text: str, label: str = f"{name}{place}", part: float | None = part) -> None:
+            progress.stage(f"{label}: {text}", part)
 
         found.append(run(problem, methods=methods, bound=bound, name=name, on_stage=stage))
     return found
@@ -231,8 +232,8 @@ def _draw(
         return {}, (f"no pictures: {error}",)
     files, remarks = {}, []
     stems: Counter[str] = Counter()
-    for one in comparisons:
-        progress.stage(f"drawing {one.name}")
+    for done, one in enumerate(comparisons):
+        progress.stage(f"drawing {one.name}", done / len(comparisons))
         stem = file_name(one.name)
         stems[stem.lower()] += 1  # some systems do not tell small letters from large ones
         if stems[stem.lower()] > 1:
