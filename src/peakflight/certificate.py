@@ -5,6 +5,7 @@ the file (`kernels.bounds`).
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
+from peakflight.yaw import Heading
+from peakflight.yaw_certificate import certify_yaw
 
 JUMP_OF_LIMIT = 1e-4
 """A derivative that is limited may jump by this part of its limit, for rounding in short pieces."""
@@ -111,14 +114,38 @@ def certify(
 
 
 def certify_plan(plan: Plan) -> Report:
-    """Prove a plan again, from its trajectory, limits and waypoints alone."""
-    return certify_answer(plan.problem, plan.trajectory, plan.pieces)
+    """Prove a plan again, from its trajectory, yaw motion, limits and waypoints alone."""
+    yaw = plan.yaw_motion
+    if yaw is None and not isinstance(plan.problem.yaw, Heading):  # from before there were any
+        return _certify_flight(plan.problem, plan.trajectory, plan.pieces)
+    return certify_answer(plan.problem, plan.trajectory, plan.pieces, yaw=yaw)
 
 
 def certify_answer(
-    problem: Problem, trajectory: Trajectory, pieces: Sequence[int] | None = None
+    problem: Problem,
+    trajectory: Trajectory,
+    pieces: Sequence[int] | None = None,
+    *,
+    yaw: Trajectory | None = None,
 ) -> Report:
-    """Prove that a trajectory answers a problem."""
+    """Prove that a trajectory answers a problem, and a yaw motion in one axis its heading."""
+    report = _certify_flight(problem, trajectory, pieces)
+    if problem.heading is None:
+        return report
+    counts = (1,) * len(trajectory) if pieces is None else pieces
+    passed = trajectory.breakpoints[np.concatenate(([0], np.cumsum(counts)))]
+    peaks, problems = certify_yaw(problem.heading, yaw, trajectory, passed)
+    return replace(
+        report,
+        feasible=report.feasible and not problems,
+        peaks=report.peaks | peaks,
+        problems=(*report.problems, *problems),
+    )
+
+
+def _certify_flight(
+    problem: Problem, trajectory: Trajectory, pieces: Sequence[int] | None
+) -> Report:
     return certify(
         trajectory,
         problem.limits,

@@ -1,9 +1,10 @@
 """From a problem to a certified plan: tidy, solve, certify."""
 
 import logging
+import math
 import time
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +16,17 @@ from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
 from peakflight.problem import Problem, as_float_array
-from peakflight.result import Plan
+from peakflight.result import Plan, Report
+from peakflight.trajectory import Trajectory
 from peakflight.version import __version__
+from peakflight.yaw import as_heading
 
 _log = logging.getLogger("peakflight")
+
+SLOWER = 1.05
+"""Factor by which a flight is slowed down further where the yaw's stretch exceeds other limits."""
+SLOWER_ROUNDS = 40
+"""Most such steps: seven times as slow."""
 
 
 def plan(
@@ -79,22 +87,26 @@ def plan(
         impossible = _contradiction(problem)
         outcome = module.solve(problem, settings)
         problem = outcome.problem or problem
-        report = certify_answer(problem, outcome.trajectory, outcome.pieces)
-    status = outcome.status
+        pieces = outcome.pieces or (1,) * (len(problem.waypoints) - 1)
+        flight = _certified(problem, outcome.trajectory, pieces)
+    report = flight.report
+    status = Status.INFEASIBLE if flight.too_fast else outcome.status
     if not report.feasible and status is not Status.INFEASIBLE:
         status = Status.NUMERICAL
-    lines = [*notes, impossible or outcome.message, *report.problems]
+    lines = [*notes, impossible or outcome.message, flight.note, *report.problems]
     return Plan(
         problem=problem,
         method=method,
         status=status,
-        trajectory=outcome.trajectory,
+        trajectory=flight.trajectory,
         report=report,
-        pieces=outcome.pieces or (1,) * (len(problem.waypoints) - 1),
+        pieces=pieces,
         iterations=outcome.iterations,
         wall_time_s=time.perf_counter() - began,
         message="; ".join(line for line in lines if line),
         history=outcome.history,
+        yaw_motion=flight.yaw,
+        yaw_deviation=flight.deviation,
         version=__version__,
         memory=outcome.memory,
     )
@@ -138,6 +150,52 @@ def replan(
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 
+class _Flight(NamedTuple):
+    """A trajectory with the yaw that is asked for, and the proof of both."""
+
+    trajectory: Trajectory
+    report: Report
+    yaw: Trajectory | None = None
+    deviation: float = 0.0
+    """Of the yaw from what it follows, rad."""
+    note: str = ""
+    """What the yaw has cost, in words."""
+    too_fast: bool = False
+    """Whether it would have to be slower for the yaw, but motion is fixed at a waypoint."""
+
+
+def _certified(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -> _Flight:
+    """Add the yaw, slow the flight down as far as its limits need it, and certify both."""
+    if problem.heading is None:
+        return _Flight(trajectory, certify_answer(problem, trajectory, pieces))
+    from peakflight.yaw_motion import turning
+
+    yaw, stretch, deviation = turning(problem, trajectory, pieces)
+    too_fast = stretch > 1.0 and not problem.is_at_rest
+    note = ""
+    if problem.heading.follows:
+        note = f"the yaw is up to {math.degrees(deviation):.3g} deg off the direction it follows"
+    if too_fast:
+        note = (
+            f"the yaw limits need a flight {stretch:.4g} times as long, which the motion that is "
+            "fixed at waypoints does not allow"
+        )
+        yaw, stretch = yaw and yaw.stretch(1.0 / stretch), 1.0
+    flight = trajectory if stretch == 1.0 else trajectory.stretch(stretch)
+    report = certify_answer(problem, flight, pieces, yaw=yaw)
+    if stretch > 1.0 and yaw is not None:
+        # Slowing down keeps most limits by itself, but those on least thrust and on turning may
+        # first be exceeded, and are kept again where the flight is slow enough.
+        for _ in range(SLOWER_ROUNDS):
+            if report.feasible:
+                break
+            stretch, yaw = stretch * SLOWER, yaw.stretch(SLOWER)
+            flight = trajectory.stretch(stretch)
+            report = certify_answer(problem, flight, pieces, yaw=yaw)
+        note = f"slowed down by {100.0 * (stretch - 1.0):.3g} % for the yaw limits"
+    return _Flight(flight, report, yaw, deviation, note, too_fast)
+
+
 def _fields(kind: Any) -> set[str]:
     return set(kind.__dataclass_fields__)
 
@@ -147,9 +205,15 @@ def _tidied(
 ) -> tuple[Problem, tuple[str, ...]]:
     if limits is None:
         raise InvalidProblem("limits is missing; give limits=peakflight.Limits(speed=..., ...)")
+    yaw = options.pop("yaw", None)
+    heading = None if yaw is None else as_heading(yaw)
     course, notes = tidy(
-        Course(as_float_array("waypoints", waypoints, (None, 3)), yaw=options.pop("yaw", None))
+        Course(
+            as_float_array("waypoints", waypoints, (None, 3)),
+            yaw=yaw if heading is None else heading.angles,  # type: ignore[arg-type]
+        )
     )
+    yaw = course.yaw if heading is None else heading.with_angles(course.yaw)
     if notes and options.get("derivatives"):
         raise InvalidProblem(
             f"{notes[0]}, but derivatives name waypoints by number; merge first (peakflight.tidy)"
@@ -157,7 +221,7 @@ def _tidied(
     unknown = set(options) - _fields(Problem)
     if unknown:
         raise InvalidProblem(f"unknown option {min(unknown)!r}")
-    return Problem(course.waypoints, limits=limits, yaw=course.yaw, **options), notes
+    return Problem(course.waypoints, limits=limits, yaw=yaw, **options), notes
 
 
 def _contradiction(problem: Problem) -> str:

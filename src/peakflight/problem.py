@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, Limits
+from peakflight.yaw import Heading, HeadingLike, as_heading
 
 DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
 """Names of the derivatives of position, by order."""
@@ -132,8 +133,10 @@ class Problem:
     """Derivatives at the last waypoint; as for `start`."""
     derivatives: Mapping[int, StateLike] = field(default_factory=dict, kw_only=True)
     """Derivatives at inner waypoints, by index; whatever is left out is free."""
-    yaw: np.ndarray | None = field(default=None, kw_only=True)
-    """(K+1,) rad, heading at each waypoint; carried to the outputs."""
+    yaw: np.ndarray | HeadingLike | None = field(default=None, kw_only=True)
+    """(K+1,) rad, at each waypoint, however fast the nose must turn for it; or a `Heading`, or what
+    is short for one: an angle in rad, "velocity", {"point": [x, y, z]}. Then an array or a
+    `Heading`."""
 
     def __post_init__(self) -> None:
         waypoints = _waypoints(self.waypoints)
@@ -190,6 +193,14 @@ class Problem:
         """Whether every derivative that is fixed is zero."""
         return not any((np.abs(state) > 0.0).any() for state in self.fixed.values())
 
+    @cached_property
+    def heading(self) -> Heading | None:
+        """What is asked of the yaw; of an array, to pass it without limits. None for nothing."""
+        if self.yaw is None or isinstance(self.yaw, Heading):
+            return self.yaw
+        angles = tuple(np.asarray(self.yaw).tolist())
+        return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None)
+
     @property
     def leg_lengths(self) -> np.ndarray:
         """(K,) m, straight distance between the waypoints of each leg."""
@@ -213,7 +224,7 @@ class Problem:
             "start": _numbers(self.start),
             "end": _numbers(self.end),
             "derivatives": inner,
-            "yaw": None if self.yaw is None else self.yaw.tolist(),
+            "yaw": self.yaw.to_dict() if isinstance(self.yaw, Heading) else _listed(self.yaw),
         }
 
     @classmethod
@@ -280,8 +291,15 @@ def _waypoints(values: ArrayLike) -> np.ndarray:
     return waypoints
 
 
-def _yaw(values: ArrayLike, count: int) -> np.ndarray:
-    yaw = as_float_array("yaw", values, (count,))
+def _yaw(asked: Any, count: int) -> np.ndarray | Heading:
+    heading = as_heading(asked)
+    if heading is not None:
+        if heading.angles is not None and len(heading.angles) != count:
+            raise InvalidProblem(
+                f"yaw has {len(heading.angles)} angles; there are {count} waypoints"
+            )
+        return heading
+    yaw = as_float_array("yaw", asked, (count,))
     if not np.isfinite(yaw).all():
         row = int((~np.isfinite(yaw)).argmax())
         raise InvalidProblem(f"waypoint {row} has yaw = {yaw[row]}; it must be finite")
@@ -342,6 +360,10 @@ def _number(value: Any) -> Any:
 
 def _numbers(state: Any) -> list[list[float | None]]:
     return [[None if math.isnan(x) else x for x in row] for row in state.tolist()]
+
+
+def _listed(array: Any) -> list[Any] | None:
+    return None if array is None else array.tolist()
 
 
 def _weights(minimize: str | Mapping[str | int, float] | Sequence[float]) -> dict[int, float]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidFile, InvalidProblem, Status
 from peakflight.files import PathLike, read_json, write_json
@@ -122,6 +123,10 @@ class Plan:
     message: str = ""
     """What the user should know: why there is no solution, what was merged, ..."""
     history: History | None = field(default=None, repr=False)
+    yaw_motion: Trajectory | None = field(default=None, repr=False)
+    """Yaw against time in one axis, rad, on knots of its own; None if none is asked for."""
+    yaw_deviation: float = 0.0
+    """Largest difference from a direction that the yaw follows, rad."""
     version: str = ""
     """Version of peakflight that made it."""
     memory: Any = field(default=None, repr=False)
@@ -146,6 +151,18 @@ class Plan:
     def waypoint_times(self) -> np.ndarray:
         """(legs+1,) s, when each waypoint is passed."""
         return self.trajectory.breakpoints[np.concatenate(([0], np.cumsum(self.pieces)))]
+
+    def yaw(self, t: ArrayLike, derivative: int = 0) -> np.ndarray:
+        """Yaw at (...,) s, (...,) rad, unwrapped, or a derivative of it; zero without a motion.
+
+        Raises
+        ------
+        ValueError
+            If a time is outside the plan, or the order is negative.
+        """
+        if self.yaw_motion is None:
+            return np.zeros_like(self.trajectory(t)[..., 0])
+        return self.yaw_motion(t, derivative)[..., 0]
 
     def to_dict(self) -> dict[str, Any]:
         """The plan file: the keys of the public contract, then what a lossless copy needs."""
@@ -175,6 +192,8 @@ class Plan:
         values["problem"] = {
             key: value for key, value in problem.items() if key not in ("waypoints", "limits")
         }
+        if self.yaw_motion is not None:
+            values["yaw"] = {**self.yaw_motion.to_dict(), "deviation": self.yaw_deviation}
         if self.history is not None:
             kappa = self.history.kappa
             values["history"] = {
@@ -242,6 +261,10 @@ class Plan:
             problems=tuple(values.get("problems", ())),
         )
         history = values.get("history")
+        yaw = values.get("yaw")
+        motion = None if yaw is None else Trajectory.from_dict(dict(yaw))
+        if motion is not None and motion.axes != 1:
+            raise InvalidProblem(f"yaw has {motion.axes} axes; it must have 1")
         return cls(
             problem=problem,
             method=str(values["method"]),
@@ -253,6 +276,8 @@ class Plan:
             wall_time_s=float(values["wall_time_s"]),
             message=str(values.get("message", "")),
             history=None if history is None else History(**history),
+            yaw_motion=motion,
+            yaw_deviation=0.0 if yaw is None else float(yaw.get("deviation", 0.0)),
             version=str(values["version"]),
         )
 

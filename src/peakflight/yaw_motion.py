@@ -1,0 +1,329 @@
+"""The yaw along a flight: a cubic spline in time, as near to what is asked as its limits allow.
+
+Every piece of the flight is cut into even parts, whose borders are the knots of a cubic B-spline.
+Yaw rate and acceleration are linear in its control points and lie in the hull of theirs, so limits
+at every instant are limits on differences of control points: a convex quadratic program whose
+matrices are bands, solved in linear time (`peakflight.banded_program`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import BSpline
+
+from peakflight.banded_program import Bounds, least_scale, least_squares
+from peakflight.problem import Problem
+from peakflight.trajectory import Trajectory
+from peakflight.yaw import YAW_KINDS, Heading, unwrapped
+
+SPACING = 0.05
+"""Largest distance of knots, s: a third of the time in which the default acceleration reaches the
+default rate."""
+PARTS = (4, 400)
+"""Fewest parts of a piece, so that every waypoint has control points of its own; and most."""
+SAMPLES = 4
+"""Points of a part at which a target is followed."""
+SMOOTHING = 0.02
+"""Time over which a target is smoothed, s: details shorter than this are not followed."""
+SLOW = 1e-3
+"""Below this part of the largest horizontal speed, or distance to the point, a direction is not
+defined; the last one holds."""
+FAITH = 0.01
+"""Least weight of a sample beside those at full speed: where the vehicle hardly moves, the nose may
+turn ahead to where it goes next."""
+BRISK = 0.1
+"""Part of the largest horizontal speed, or distance, at which a sample has half its weight."""
+CAUTION = 1e-4
+"""How much further than needed a flight is slowed down, relative: it leaves room to be smooth."""
+SAFETY = 1e-7
+"""Part of a limit that is left to rounding; the certificate knows nothing of it."""
+ROUNDS = 30
+"""Most linear programs to the smallest stretch; 2 to 8 are usual."""
+CLOSENESS = 1e-7
+"""Relative change of the stretch at which that ends."""
+_GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+
+
+class Turning(NamedTuple):
+    """A yaw motion, and what it asks of the flight."""
+
+    yaw: Trajectory | None
+    """One axis, rad, on knots of its own; None if none was found."""
+    stretch: float
+    """How much slower the flight has to be for it, 1 if not at all; `yaw` is for that flight."""
+    deviation: float
+    """Largest difference from what is followed, rad; 0 if waypoints or a fixed yaw are met."""
+
+
+def turning(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -> Turning:
+    """The yaw that a problem asks for along a trajectory.
+
+    Parameters
+    ----------
+    problem
+        With a heading.
+    trajectory
+        (K,) pieces in three axes that answer it.
+    pieces
+        (legs,) how many pieces each leg has.
+    """
+    heading = problem.heading
+    assert heading is not None
+    if heading.policy == "fixed":
+        constant = np.full((1, 1, 1), heading.angle)
+        yaw = Trajectory(constant, [trajectory.duration], trajectory.start_time)  # type: ignore[arg-type]
+        return Turning(yaw, 1.0, 0.0)
+    spline = _Spline.of(trajectory.segment_times)
+    if heading.angles is not None:
+        marks = spline.firsts[np.concatenate(([0], np.cumsum(pieces)))]
+        return _through(heading, spline, marks, unwrapped(np.array(heading.angles)), trajectory)
+    return _following(heading, spline, trajectory)
+
+
+def _through(
+    heading: Heading, spline: "_Spline", marks: np.ndarray, angles: np.ndarray, flight: Trajectory
+) -> Turning:
+    """The yaw of least squared acceleration through (n,) angles at (n,) knots."""
+    free, fixed = spline.eliminated(marks, angles)
+    stretch = 1.0
+    if heading.limits:
+        stretch = _least_stretch(heading, spline, free, fixed)
+        if not stretch < np.inf:
+            return Turning(None, 1.0, 0.0)
+    spline = spline.stretched(stretch)
+    roughness = spline.roughness()
+    x = least_squares(
+        sparse.csr_array(roughness @ free),
+        -(roughness @ fixed),
+        _bounds(heading, spline, free, fixed),
+    )
+    if x is None:
+        return Turning(None, stretch, 0.0)
+    control = free @ x + fixed
+    return Turning(spline.trajectory(control, flight.start_time), stretch, 0.0)
+
+
+def _least_stretch(
+    heading: Heading, spline: "_Spline", free: sparse.csr_array, fixed: np.ndarray
+) -> float:
+    """By how much time has to be stretched for the limits to be kept; infinite if none is found.
+
+    A stretch s allows s times the rate and s^2 times the acceleration. The latter is not linear in
+    s; its tangent at the last s is below it, so every round is feasible and none slower.
+    """
+    bounds = _bounds(heading, spline, free, fixed)
+    squared = bounds.growing
+    last = 1.0
+    for _ in range(ROUNDS):
+        tangent = bounds._replace(
+            fixed=np.where(squared == 2.0, -(last**2), 0.0) * bounds.fixed,
+            growing=np.where(squared == 2.0, 2.0 * last, 1.0) * bounds.fixed,
+        )
+        found = least_scale(tangent)
+        if found is None:
+            return np.inf
+        stretch = found[1] * (1.0 + CAUTION)
+        if stretch <= 1.0:
+            return 1.0
+        if abs(found[1] - last) <= CLOSENESS * last:
+            return stretch
+        last = found[1]
+    return stretch
+
+
+def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> Turning:
+    """The yaw nearest to the direction of the velocity, or to a point."""
+    piece, local = spline.samples(trajectory)
+    if heading.point is None:
+        towards = trajectory.at(piece, local, 1)[:, :2]
+    else:
+        towards = np.array(heading.point[:2]) - trajectory.at(piece, local)[:, :2]
+    target, trust = directions(towards)
+    free = spline.at_rest()
+    basis = spline.basis(spline.sample_times)
+    weights = np.sqrt(trust * np.repeat(spline.parts, SAMPLES) / SAMPLES)
+    centre = float(target[0])
+    roughness = SMOOTHING**2 * spline.roughness()
+    rows = sparse.vstack((sparse.diags_array(weights) @ basis, roughness)) @ free
+    wanted = np.concatenate((weights * (target - centre), np.zeros(roughness.shape[0])))
+    offset = np.zeros(free.shape[0])
+    x = least_squares(sparse.csr_array(rows), wanted, _bounds(heading, spline, free, offset))
+    if x is None:
+        return Turning(None, 1.0, np.nan)
+    control = free @ x + centre
+    deviation = float(np.abs(basis @ control - target).max())
+    return Turning(spline.trajectory(control, trajectory.start_time), 1.0, deviation)
+
+
+def directions(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) rad, unwrapped, the directions of (n, 2) vectors; and (n,) how much each counts.
+
+    A vector that is much shorter than the longest has no direction: the last one before it holds,
+    and before the first direction that. Without any it is 0.
+    """
+    lengths = np.hypot(vectors[:, 0], vectors[:, 1])
+    longest = float(lengths.max())
+    known = lengths > SLOW * longest
+    if not known.any():
+        return np.zeros(len(vectors)), np.ones(len(vectors))
+    angles = np.arctan2(vectors[:, 1], vectors[:, 0])
+    last = np.maximum.accumulate(np.where(known, np.arange(len(vectors)), -1))
+    last[last < 0] = int(known.argmax())
+    square = (lengths / longest) ** 2
+    return unwrapped(angles[last]), np.maximum(square / (square + BRISK**2), FAITH)
+
+
+def _bounds(
+    heading: Heading, spline: "_Spline", free: sparse.csr_array, fixed: np.ndarray
+) -> Bounds:
+    """Limits of rate and acceleration on x, where the control points are free x + fixed.
+
+    Rows are relative to the limits; `growing` holds the order of the derivative.
+    """
+    rows, offsets, orders = [], [], []
+    for kind, limit in heading.limits.items():
+        differences = spline.differences[kind.order - 1] / limit
+        rows.append(differences @ free)
+        offsets.append(differences @ fixed)
+        orders.append(np.full(differences.shape[0], float(kind.order)))
+    if not rows:
+        empty = np.zeros(0)
+        return Bounds(sparse.csr_array((0, free.shape[1])), empty, empty, empty)
+    growing = np.concatenate(orders)
+    room = np.full(len(growing), 1.0 - SAFETY)
+    return Bounds(sparse.csr_array(sparse.vstack(rows)), np.concatenate(offsets), room, growing)
+
+
+class _Spline(NamedTuple):
+    """Cubic splines on given knots, by their n = M + 3 control points."""
+
+    parts: np.ndarray
+    """(M,) s, time between knots."""
+    firsts: np.ndarray
+    """(K+1,) knot at which each piece of the flight begins, and the last one."""
+    knots: np.ndarray
+    """(M+7,) s, from 0, the first and last four times."""
+    differences: tuple[sparse.csr_array, sparse.csr_array]
+    """(n-1, n) and (n-2, n): control points of rate and acceleration from those of the yaw."""
+
+    @classmethod
+    def of(cls, segment_times: np.ndarray) -> "_Spline":
+        counts = np.clip(np.ceil(segment_times / SPACING), *PARTS).astype(np.int64)
+        firsts = np.concatenate(([0], np.cumsum(counts)))
+        return cls._on(np.repeat(segment_times / counts, counts), firsts)
+
+    @classmethod
+    def _on(cls, parts: np.ndarray, firsts: np.ndarray) -> "_Spline":
+        times = np.concatenate(([0.0], np.cumsum(parts)))
+        knots = np.concatenate((times[[0, 0, 0]], times, times[[-1, -1, -1]]))
+        count = len(parts) + 3
+        rate = 3.0 / (knots[4:-1] - knots[1:-4])
+        acceleration = 2.0 / (knots[4:-2] - knots[2:-4])
+        first = sparse.diags_array((-rate, rate), offsets=(0, 1), shape=(count - 1, count))
+        second = sparse.diags_array(
+            (-acceleration, acceleration), offsets=(0, 1), shape=(count - 2, count - 1)
+        )
+        return cls(
+            parts, firsts, knots, (sparse.csr_array(first), sparse.csr_array(second @ first))
+        )
+
+    def stretched(self, factor: float) -> "_Spline":
+        return self if factor == 1.0 else self._on(self.parts * factor, self.firsts)
+
+    @property
+    def sample_times(self) -> np.ndarray:
+        """(M SAMPLES,) s, the middles of even intervals of each part."""
+        inside = (np.arange(SAMPLES) + 0.5) / SAMPLES
+        return (self.knots[3:-4, None] + self.parts[:, None] * inside).ravel()
+
+    def samples(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+        """Pieces of the flight, and times since they began, of `sample_times`."""
+        piece = np.repeat(np.arange(len(trajectory)), SAMPLES * np.diff(self.firsts))
+        begins = self.knots[3 + self.firsts]
+        return piece, self.sample_times - begins[piece]
+
+    def basis(self, times: np.ndarray) -> sparse.csr_array:
+        """(len(times), n): the yaw at times from the control points."""
+        return sparse.csr_array(BSpline.design_matrix(times, self.knots, 3))
+
+    def roughness(self) -> sparse.csr_array:
+        """(2M, n): rows whose squares add up to the integral of the squared acceleration.
+
+        Acceleration is linear between knots, so two points of Gauss are exact.
+        """
+        m = len(self.parts)
+        weights = np.sqrt(0.5 * self.parts)
+        rows = [
+            sparse.diags_array(
+                (weights * (1.0 - at), weights * at), offsets=(0, 1), shape=(m, m + 1)
+            )
+            for at in _GAUSS
+        ]
+        # order by knot: the product with its transpose is then a narrow band either way
+        return sparse.csr_array(sparse.vstack(rows) @ self.differences[1])
+
+    def at_rest(self) -> sparse.csr_array:
+        """(n, n-2): control points of splines that begin and end at rate 0."""
+        inner = len(self.parts) + 1
+        columns = np.concatenate(([0], np.arange(inner), [inner - 1]))
+        ones = np.ones(inner + 2)
+        return sparse.csr_array((ones, (np.arange(inner + 2), columns)))
+
+    def eliminated(
+        self, marks: np.ndarray, values: np.ndarray
+    ) -> tuple[sparse.csr_array, np.ndarray]:
+        """Splines that begin and end at rate 0 and pass (n,) values at (n,) knots.
+
+        Of the three control points that make the value at a knot, the weightiest follows from the
+        other two; knots are far enough apart for them to be different ones.
+
+        Returns
+        -------
+        Matrix and vector that make the control points of what stays free.
+        """
+        count = len(self.parts) + 3
+        fixed = np.zeros(count)
+        fixed[:2], fixed[-2:] = values[0], values[-1]
+        inner = marks[1:-1]
+        rows = self.basis(self.knots[3 + inner])
+        members = inner[:, None] + np.arange(3)
+        weights = np.asarray(
+            rows[np.repeat(np.arange(len(inner)), 3), members.ravel()]
+        ).reshape(-1, 3)
+        chosen = weights.argmax(axis=1)
+        pick = np.arange(len(inner))
+        dependent, pivot = members[pick, chosen], weights[pick, chosen]
+        fixed[dependent] = values[1:-1] / pivot
+        is_free = np.ones(count, dtype=bool)
+        is_free[[0, 1, -2, -1]] = False
+        is_free[dependent] = False
+        number = np.cumsum(is_free) - 1
+        own = np.flatnonzero(is_free)
+        others = np.array([[1, 2], [0, 2], [0, 1]])[chosen]
+        partners = np.take_along_axis(members, others, axis=1)
+        shares = -np.take_along_axis(weights, others, axis=1) / pivot[:, None]
+        row = np.concatenate((own, np.repeat(dependent, 2)))
+        column = np.concatenate((number[own], number[partners.ravel()]))
+        data = np.concatenate((np.ones(len(own)), shares.ravel()))
+        return sparse.csr_array((data, (row, column)), shape=(count, len(own))), fixed
+
+    def trajectory(self, control: np.ndarray, start_time: float) -> Trajectory:
+        """The spline of (n,) control points as ascending polynomials."""
+        first, second = (differences @ control for differences in self.differences)
+        yaw = self.basis(self.knots[3:-3]) @ control
+        rate = self._rates(first)
+        third = np.diff(second) / self.parts
+        coefficients = np.stack((yaw[:-1], rate[:-1], second[:-1] / 2.0, third / 6.0), axis=1)
+        return Trajectory(coefficients[:, :, None], self.parts, start_time)
+
+    def _rates(self, control: np.ndarray) -> np.ndarray:
+        """(M+1,) rate at the knots from its (M+2,) control points."""
+        before = np.concatenate(([0.0], self.parts))
+        after = np.concatenate((self.parts, [0.0]))
+        share = before / (before + after)
+        rates: np.ndarray = (1.0 - share) * control[:-1] + share * control[1:]
+        return rates
+
+
+__all__ = ["YAW_KINDS", "Turning", "directions", "turning"]
