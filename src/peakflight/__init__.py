@@ -19,6 +19,7 @@ from peakflight.problem import Problem
 from peakflight.result import History, Plan, Report
 from peakflight.trajectory import Trajectory
 from peakflight.version import __version__
+from peakflight.yaw import Heading
 
 if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
@@ -30,6 +31,7 @@ __all__ = [
     "GRAVITY",
     "KINDS",
     "Course",
+    "Heading",
     "History",
     "InvalidFile",
     "InvalidProblem",

@@ -270,8 +270,7 @@ def warm_up(problem: Problem, methods: Sequence[str] | None = None) -> None:
     """Load what methods are compiled to, by the first two legs, so that CPU times leave it out."""
     legs = min(len(problem.waypoints) - 1, 2)
     if not problem.derivatives:
-        yaw = None if problem.yaw is None else problem.yaw[: legs + 1]
-        problem = replace(problem, waypoints=problem.waypoints[: legs + 1], yaw=yaw)
+        problem = replace(problem, waypoints=problem.waypoints[: legs + 1], yaw=None)
     for method in dict.fromkeys((*check_methods(methods), BASELINE)):
         run_method(problem, method, None)
 

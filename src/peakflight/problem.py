@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
-from peakflight.limits import BOUNDING, Limits
+from peakflight.limits import BOUNDING, LimitKind, Limits
 from peakflight.yaw import Heading, HeadingLike, as_heading
 
 DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
@@ -201,6 +201,12 @@ class Problem:
         angles = tuple(np.asarray(self.yaw).tolist())
         return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None)
 
+    @cached_property
+    def allowed(self) -> dict[LimitKind, float]:
+        """Every kind that is limited, of the flight and of its yaw, with the limit in its unit."""
+        flight = {kind: getattr(self.limits, kind.name) for kind in self.limits.active}
+        return flight if self.heading is None else flight | self.heading.limits
+
     @property
     def leg_lengths(self) -> np.ndarray:
         """(K,) m, straight distance between the waypoints of each leg."""
@@ -294,10 +300,8 @@ def _waypoints(values: ArrayLike) -> np.ndarray:
 def _yaw(asked: Any, count: int) -> np.ndarray | Heading:
     heading = as_heading(asked)
     if heading is not None:
-        if heading.angles is not None and len(heading.angles) != count:
-            raise InvalidProblem(
-                f"yaw has {len(heading.angles)} angles; there are {count} waypoints"
-            )
+        if heading.angles is not None:
+            as_float_array("yaw", heading.angles, (count,))
         return heading
     yaw = as_float_array("yaw", asked, (count,))
     if not np.isfinite(yaw).all():

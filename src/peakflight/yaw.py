@@ -53,9 +53,7 @@ class Heading:
 
     def __post_init__(self) -> None:
         if self.policy not in ASKED:
-            raise InvalidProblem(
-                f"yaw policy is {self.policy!r}; known are {', '.join(ASKED)}"
-            )
+            raise InvalidProblem(f"yaw policy is {self.policy!r}; known are {', '.join(ASKED)}")
         for name in filter(None, ASKED.values()):
             given = getattr(self, name) is not None
             if given != (name == ASKED[self.policy]):
@@ -117,7 +115,7 @@ class Heading:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """A heading from what `to_dict` gave; without a policy, the one that what is given needs."""
+        """A heading from what `to_dict` gave; a policy that is left out follows from the rest."""
         values = dict(values)
         unknown = set(values) - {field.name for field in fields(cls)}
         if unknown:

@@ -1,8 +1,8 @@
 """What is proven about a yaw motion, from its coefficients alone.
 
-Nothing here is shared with what makes the motion. A yaw of degree 3 at most has a rate whose largest
-value is at an end of a piece or at the one vertex, and an acceleration whose is at an end; the
-rounding error of each value is bounded and added.
+Nothing here is shared with what makes the motion. If a yaw has degree 3 at most, the largest rate
+of a piece is at an end or at the one vertex, and the largest acceleration at an end; the rounding
+error of each value is bounded and added.
 """
 
 import numpy as np
@@ -119,7 +119,9 @@ def _jumps(coefficients: np.ndarray, times: np.ndarray, heading: Heading) -> lis
     lines = []
     for order, what in enumerate(WHAT):
         begins = factors[order, order] * coefficients[:, order]
-        ends = (factors[order, order:] * coefficients[:, order:] * powers[:, : 4 - order]).sum(axis=1)
+        ends = (factors[order, order:] * coefficients[:, order:] * powers[:, : 4 - order]).sum(
+            axis=1
+        )
         allowed = np.minimum(JOINT_TOLERANCE * sizes / times**order, caps.get(order, np.inf))
         jumps = np.abs(begins[1:] - ends[:-1])
         wrong = ~(jumps <= np.maximum(allowed[1:], allowed[:-1]))
@@ -128,7 +130,9 @@ def _jumps(coefficients: np.ndarray, times: np.ndarray, heading: Heading) -> lis
             lines.append(f"{what} jumps by {jumps[joint]:.3g} at the end of its piece {joint}")
         at_ends = np.abs([begins[0], ends[-1]])
         if order == 1 and not (at_ends <= allowed[[0, -1]]).all():
-            lines.append(f"{what} is {at_ends.max():.3g} rad/s at an end of the flight; it must be 0")
+            lines.append(
+                f"{what} is {at_ends.max():.3g} rad/s at an end of the flight; it must be 0"
+            )
     return lines
 
 

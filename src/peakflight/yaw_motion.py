@@ -15,7 +15,7 @@ from scipy.interpolate import BSpline
 from peakflight.banded_program import Bounds, least_scale, least_squares
 from peakflight.problem import Problem
 from peakflight.trajectory import Trajectory
-from peakflight.yaw import YAW_KINDS, Heading, unwrapped
+from peakflight.yaw import Heading, unwrapped
 
 SPACING = 0.05
 """Largest distance of knots, s: a third of the time in which the default acceleration reaches the
@@ -86,11 +86,9 @@ def _through(
 ) -> Turning:
     """The yaw of least squared acceleration through (n,) angles at (n,) knots."""
     free, fixed = spline.eliminated(marks, angles)
-    stretch = 1.0
-    if heading.limits:
-        stretch = _least_stretch(heading, spline, free, fixed)
-        if not stretch < np.inf:
-            return Turning(None, 1.0, 0.0)
+    stretch = _least_stretch(_bounds(heading, spline, free, fixed)) if heading.limits else 1.0
+    if stretch is None:
+        return Turning(None, 1.0, 0.0)
     spline = spline.stretched(stretch)
     roughness = spline.roughness()
     x = least_squares(
@@ -99,49 +97,40 @@ def _through(
         _bounds(heading, spline, free, fixed),
     )
     if x is None:
-        return Turning(None, stretch, 0.0)
+        return Turning(None, 1.0, 0.0)
     control = free @ x + fixed
     return Turning(spline.trajectory(control, flight.start_time), stretch, 0.0)
 
 
-def _least_stretch(
-    heading: Heading, spline: "_Spline", free: sparse.csr_array, fixed: np.ndarray
-) -> float:
-    """By how much time has to be stretched for the limits to be kept; infinite if none is found.
+def _least_stretch(bounds: Bounds) -> float | None:
+    """By how much time has to be stretched for bounds to be kept, 1 at least; None if not found.
 
     A stretch s allows s times the rate and s^2 times the acceleration. The latter is not linear in
     s; its tangent at the last s is below it, so every round is feasible and none slower.
     """
-    bounds = _bounds(heading, spline, free, fixed)
-    squared = bounds.growing
-    last = 1.0
+    is_squared = bounds.growing == 2.0
+    last = scale = 1.0
     for _ in range(ROUNDS):
         tangent = bounds._replace(
-            fixed=np.where(squared == 2.0, -(last**2), 0.0) * bounds.fixed,
-            growing=np.where(squared == 2.0, 2.0 * last, 1.0) * bounds.fixed,
+            fixed=np.where(is_squared, -(last**2), 0.0) * bounds.fixed,
+            growing=np.where(is_squared, 2.0 * last, 1.0) * bounds.fixed,
         )
-        found = least_scale(tangent)
+        found = least_scale(tangent, enough=1.0 / (1.0 + CAUTION))
         if found is None:
-            return np.inf
-        stretch = found[1] * (1.0 + CAUTION)
-        if stretch <= 1.0:
-            return 1.0
-        if abs(found[1] - last) <= CLOSENESS * last:
-            return stretch
-        last = found[1]
-    return stretch
+            return None
+        scale = found
+        if abs(scale - last) <= CLOSENESS * last or scale * (1.0 + CAUTION) <= 1.0:
+            break
+        last = scale
+    return max(1.0, scale * (1.0 + CAUTION))
 
 
 def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> Turning:
     """The yaw nearest to the direction of the velocity, or to a point."""
-    piece, local = spline.samples(trajectory)
-    if heading.point is None:
-        towards = trajectory.at(piece, local, 1)[:, :2]
-    else:
-        towards = np.array(heading.point[:2]) - trajectory.at(piece, local)[:, :2]
-    target, trust = directions(towards)
+    times = sample_times(spline.parts)
+    target, trust = followed(heading, trajectory, trajectory.start_time + times)
     free = spline.at_rest()
-    basis = spline.basis(spline.sample_times)
+    basis = spline.basis(times)
     weights = np.sqrt(trust * np.repeat(spline.parts, SAMPLES) / SAMPLES)
     centre = float(target[0])
     roughness = SMOOTHING**2 * spline.roughness()
@@ -154,6 +143,24 @@ def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> T
     control = free @ x + centre
     deviation = float(np.abs(basis @ control - target).max())
     return Turning(spline.trajectory(control, trajectory.start_time), 1.0, deviation)
+
+
+def sample_times(parts: np.ndarray) -> np.ndarray:
+    """(M SAMPLES,) s since the first of (M,) s parts began, at which a direction is followed."""
+    begins = np.cumsum(parts) - parts
+    inside = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    times: np.ndarray = (begins[:, None] + parts[:, None] * inside).ravel()
+    return times
+
+
+def followed(
+    heading: Heading, trajectory: Trajectory, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The direction that a heading follows at (n,) s, and its weights, both as `directions`."""
+    times = np.clip(times, trajectory.start_time, trajectory.end_time)
+    if heading.point is None:
+        return directions(trajectory(times, derivative=1)[:, :2])
+    return directions(np.array(heading.point[:2]) - trajectory(times)[:, :2])
 
 
 def directions(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -231,20 +238,10 @@ class _Spline(NamedTuple):
     def stretched(self, factor: float) -> "_Spline":
         return self if factor == 1.0 else self._on(self.parts * factor, self.firsts)
 
-    @property
-    def sample_times(self) -> np.ndarray:
-        """(M SAMPLES,) s, the middles of even intervals of each part."""
-        inside = (np.arange(SAMPLES) + 0.5) / SAMPLES
-        return (self.knots[3:-4, None] + self.parts[:, None] * inside).ravel()
-
-    def samples(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-        """Pieces of the flight, and times since they began, of `sample_times`."""
-        piece = np.repeat(np.arange(len(trajectory)), SAMPLES * np.diff(self.firsts))
-        begins = self.knots[3 + self.firsts]
-        return piece, self.sample_times - begins[piece]
-
     def basis(self, times: np.ndarray) -> sparse.csr_array:
         """(len(times), n): the yaw at times from the control points."""
+        if len(times) == 0:
+            return sparse.csr_array((0, len(self.parts) + 3))
         return sparse.csr_array(BSpline.design_matrix(times, self.knots, 3))
 
     def roughness(self) -> sparse.csr_array:
@@ -260,7 +257,6 @@ class _Spline(NamedTuple):
             )
             for at in _GAUSS
         ]
-        # order by knot: the product with its transpose is then a narrow band either way
         return sparse.csr_array(sparse.vstack(rows) @ self.differences[1])
 
     def at_rest(self) -> sparse.csr_array:
@@ -286,11 +282,9 @@ class _Spline(NamedTuple):
         fixed = np.zeros(count)
         fixed[:2], fixed[-2:] = values[0], values[-1]
         inner = marks[1:-1]
-        rows = self.basis(self.knots[3 + inner])
-        members = inner[:, None] + np.arange(3)
-        weights = np.asarray(
-            rows[np.repeat(np.arange(len(inner)), 3), members.ravel()]
-        ).reshape(-1, 3)
+        rows = self.basis(self.knots[3 + inner])  # four entries each, of which the last is 0
+        members = rows.indices.reshape(-1, 4)[:, :3]
+        weights = rows.data.reshape(-1, 4)[:, :3]
         chosen = weights.argmax(axis=1)
         pick = np.arange(len(inner))
         dependent, pivot = members[pick, chosen], weights[pick, chosen]
@@ -324,6 +318,3 @@ class _Spline(NamedTuple):
         share = before / (before + after)
         rates: np.ndarray = (1.0 - share) * control[:-1] + share * control[1:]
         return rates
-
-
-__all__ = ["YAW_KINDS", "Turning", "directions", "turning"]

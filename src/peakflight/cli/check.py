@@ -23,9 +23,10 @@ from peakflight.cli.output import (
 from peakflight.cli.progress import Progress
 from peakflight.errors import LONGEST_QUOTE, InvalidFile, Status
 from peakflight.files import read_json
-from peakflight.limits import LABELS, Limits
+from peakflight.limits import Limits
 from peakflight.problem import derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
+from peakflight.yaw import ALL_LABELS
 
 CLAIM_TOLERANCE = 1e-6
 """Two numbers agree that are this near, relative; bounds are good to 1e-10."""
@@ -92,10 +93,10 @@ def _false_claims(values: Mapping[str, Any], plan: Plan, report: Report) -> tupl
     claimed = plan.report.peaks
     for name, proven in report.peaks.items():
         if name not in claimed:
-            lines.append(f"claims no peaks of {LABELS[name]}, which it limits")
+            lines.append(f"claims no peaks of {ALL_LABELS[name]}, which it limits")
         elif len(claimed[name]) != len(proven):
             lines.append(
-                f"claims {len(claimed[name])} peaks of {LABELS[name]}, there are {len(proven)} "
+                f"claims {len(claimed[name])} peaks of {ALL_LABELS[name]}, there are {len(proven)} "
                 "segments"
             )
         else:
@@ -103,8 +104,8 @@ def _false_claims(values: Mapping[str, Any], plan: Plan, report: Report) -> tupl
             if wrong.any():
                 segment = int(wrong.argmax())
                 lines.append(
-                    f"claims a {LABELS[name]} of {claimed[name][segment]:.9g} times its limit in "
-                    f"segment {segment}, proven is {proven[segment]:.9g}"
+                    f"claims a {ALL_LABELS[name]} of {claimed[name][segment]:.9g} times its limit "
+                    f"in segment {segment}, proven is {proven[segment]:.9g}"
                 )
     lines += [
         f"claims peaks of {name}, which it does not limit"
@@ -120,14 +121,13 @@ def _agrees(claimed: Any, proven: float) -> bool:
 
 
 def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[str, Any]:
-    limits = plan.problem.limits
     worst = {}
-    for kind in limits.active:
+    for kind, limit in plan.problem.allowed.items():
         kappa = report.peaks[kind.name]
         segment = int(kappa.argmax())
         worst[kind.name] = {
-            "limit": getattr(limits, kind.name),
-            "reached": attained(kind, limits, float(kappa[segment])),
+            "limit": limit,
+            "reached": attained(kind, limit, float(kappa[segment])),
             "unit": kind.unit,
             "ratio": float(kappa[segment]),
             "segment": segment,
@@ -135,7 +135,7 @@ def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[st
         }
     return {
         **report.to_dict(),
-        "limits": limits.to_dict(),
+        "limits": plan.problem.limits.to_dict(),
         "worst": worst,
         "duration": plan.duration,
         "continuity": plan.problem.spline_class.continuity,
@@ -184,13 +184,12 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
 
 
 def _limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
-    limits = plan.problem.limits
-    for kind in limits.active:
+    for kind, limit in plan.problem.allowed.items():
         worst = float(report.peaks[kind.name].max())
-        reached = attained(kind, limits, worst)
+        reached = attained(kind, limit, worst)
         yield (
             kind.label,
-            amount(kind, getattr(limits, kind.name)),
+            amount(kind, limit),
             "" if reached is None else number(kind, reached),
             *ratio_cells(worst),
             ranges(report.binding_segments(kind.name)),

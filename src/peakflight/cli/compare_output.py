@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from peakflight.cli.options import written
 from peakflight.cli.output import Printout, seconds
-from peakflight.limits import LABELS
+from peakflight.yaw import ALL_LABELS
 
 if TYPE_CHECKING:
     from peakflight.compare import Comparison, Summary
@@ -120,7 +120,7 @@ def _solves(one: "Comparison") -> Iterator[Sequence[str]]:
             row.status,
             str(row.iterations),
             f"{1e3 * row.cpu_time_s:.3g}",
-            ", ".join(LABELS[name] for name in row.binding) or NONE,
+            ", ".join(ALL_LABELS[name] for name in row.binding) or NONE,
         )
 
 

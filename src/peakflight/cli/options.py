@@ -1,7 +1,7 @@
 """Options that several commands share, and how limits are written on the command line."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import click
@@ -21,7 +21,11 @@ def parse_limits(text: str) -> Limits:
         If an item is not name=value, a name is unknown or given twice, a value is not a number,
         or the limits are against their own rules.
     """
-    kinds = {kind.name: kind for kind in KINDS}
+    return Limits.from_dict(named_values(text, {kind.name: kind for kind in KINDS}))
+
+
+def named_values(text: str, kinds: Mapping[str, LimitKind]) -> dict[str, float]:
+    """Values from `speed=5,tilt=50deg`, by names of `kinds`; errors as of `parse_limits`."""
     values: dict[str, float] = {}
     for item in text.split(","):
         name, mark, value = (part.strip() for part in item.partition("="))
@@ -34,7 +38,7 @@ def parse_limits(text: str) -> Limits:
         if name in values:
             raise InvalidProblem(f"limit {name} is given twice")
         values[name] = _number(kinds[name], value)
-    return Limits.from_dict(values)
+    return values
 
 
 def written(limits: Limits, separator: str = ",") -> str:

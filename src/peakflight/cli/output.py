@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from peakflight.limits import LimitKind, Limits
+from peakflight.limits import LimitKind
 from peakflight.result import BINDING
 
 NARROWEST, WIDEST = 80, 100
@@ -97,9 +97,8 @@ def amount(kind: LimitKind, value: float) -> str:
     return f"{number(kind, value)} {'deg' if kind.unit == 'rad' else kind.unit}"
 
 
-def attained(kind: LimitKind, limits: Limits, ratio: float) -> float | None:
+def attained(kind: LimitKind, limit: float, ratio: float) -> float | None:
     """Value that a certified ratio stands for, in the unit of its kind; None where unbounded."""
-    limit: float = getattr(limits, kind.name)
     if ratio >= UNBOUNDED:
         return None
     if kind.name.startswith("least_"):

@@ -12,6 +12,7 @@ from peakflight.cli.options import common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
+from peakflight.cli.yaw_options import heading_of, yaw_options
 from peakflight.errors import InvalidProblem, MissingExtra
 from peakflight.formats import FLIGHT_WRITERS
 from peakflight.limits import PAPER_LIMITS, Limits
@@ -24,6 +25,7 @@ PICTURES = {
     "course": "the path, coloured by speed",
     "derivatives": "what is limited, against time",
     "segment_times": "times of the legs, by iteration",
+    "yaw": "yaw, its rate and its acceleration, against time",
 }
 """Name without .png, and what it shows."""
 VARIANTS = ("descent", "paper")
@@ -87,6 +89,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
     "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
+@yaw_options
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option(
@@ -115,6 +118,8 @@ def plan(
     effort: float | None,
     time_limit: float | None,
     limits: Limits | None,
+    yaw: dict[str, Any] | None,
+    yaw_limits: dict[str, float | None] | None,
     minimize: str,
     degree: int | None,
     continuity: int | None,
@@ -152,7 +157,7 @@ def plan(
             minimize=minimize,
             degree=degree,
             continuity=continuity,
-            yaw=read.yaw,
+            yaw=heading_of(yaw, yaw_limits, read.yaw),
         )
         with OutputFolder(output or folder_for(read.name)) as folder:
             progress.stage(f"planning {len(read)} waypoints by {method}")

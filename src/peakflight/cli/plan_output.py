@@ -7,8 +7,8 @@ import numpy as np
 
 from peakflight.cli.options import written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
-from peakflight.limits import LABELS
 from peakflight.result import Plan
+from peakflight.yaw import ALL_LABELS
 
 MOST_LEGS = 40
 """More legs than this are not all shown."""
@@ -102,22 +102,21 @@ def _legs(plan: Plan) -> Iterator[Sequence[str] | None]:
                 yield None
             continue
         ratio, margin, meaning = ratio_cells(float(kappa[closest[leg], leg]))
-        name = LABELS[names[closest[leg]]]
+        name = ALL_LABELS[names[closest[leg]]]
         yield str(leg), seconds(float(times[leg])), name, ratio, margin, meaning
 
 
 def _worst(plan: Plan) -> Iterator[Sequence[str]]:
     """The worst ratio of each limit, and the leg where it is."""
-    limits = plan.problem.limits
     legs = np.repeat(np.arange(len(plan.pieces)), plan.pieces)
-    for kind in limits.active:
+    for kind, limit in plan.problem.allowed.items():
         kappa = plan.report.peaks[kind.name]
         segment = int(kappa.argmax())
         worst = float(kappa[segment])
-        reached = attained(kind, limits, worst)
+        reached = attained(kind, limit, worst)
         yield (
             kind.label,
-            amount(kind, getattr(limits, kind.name)),
+            amount(kind, limit),
             "" if reached is None else number(kind, reached),
             *ratio_cells(worst),
             str(legs[segment]),

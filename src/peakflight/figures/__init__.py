@@ -23,6 +23,7 @@ from peakflight.figures.overlaid_derivatives import overlaid_derivatives_figure
 from peakflight.figures.paths import paths_figure
 from peakflight.figures.saving import save_figures, write_figure
 from peakflight.figures.segment_times import segment_times_figure
+from peakflight.figures.yaw import yaw_figure
 
 __all__ = [
     "Flight",
@@ -38,4 +39,5 @@ __all__ = [
     "segment_times_figure",
     "side_by_side",
     "write_figure",
+    "yaw_figure",
 ]

@@ -72,8 +72,8 @@ def derivatives_figure(plan: Plan) -> Figure:
         if limit is not None:
             kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
             _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
-        _draw_borders(axes, plan.waypoint_times)
-    _number_legs(panels[0], plan.waypoint_times)
+        draw_borders(axes, plan.waypoint_times)
+    number_legs(panels[0], plan.waypoint_times)
     return figure
 
 
@@ -190,7 +190,8 @@ def _mark_peaks(
         )
 
 
-def _draw_borders(axes: Axes, borders: np.ndarray) -> None:
+def draw_borders(axes: Axes, borders: np.ndarray) -> None:
+    """Draw a line at each border of a leg, as many as can be told apart; borders in s."""
     inner = borders[1:-1]
     inner = inner[:: even_step(len(inner), MOST_BORDERS)]
     lines = [[(time, 0.0), (time, 1.0)] for time in inner]
@@ -206,7 +207,7 @@ def _draw_borders(axes: Axes, borders: np.ndarray) -> None:
     )
 
 
-def _number_legs(axes: Axes, borders: np.ndarray) -> None:
+def number_legs(axes: Axes, borders: np.ndarray) -> None:
     """Write the number of each leg above its middle, as far as there is room."""
     legs = len(borders) - 1
     points = POINTS * (WIDTH - LEFT - RIGHT) / (borders[-1] - borders[0])

@@ -26,8 +26,8 @@ from peakflight.figures.canvas import (
     write_headline,
     write_note,
 )
-from peakflight.limits import KINDS
 from peakflight.result import BINDING, Plan
+from peakflight.yaw import ALL_LABELS
 
 LEFT, RIGHT, BOTTOM = 0.75, 1.1, 0.45
 """Margins, in."""
@@ -58,7 +58,6 @@ LEGEND_COLUMNS = 5
 SHADES = (1.0, 0.45, 0.75, 0.1, 0.3, 0.6, 0.9, 0.2)
 """Colours of the kinds of limit in the order of `KINDS`: neighbours differ in lightness."""
 HATCHES = ("", "////", "....", "xxxx", r"\\\\", "++", "oo", "**")
-_LABELS = {kind.name: kind.label for kind in KINDS}
 
 
 def segment_times_figure(plan: Plan, *, title: str | None = None) -> Figure:
@@ -204,7 +203,7 @@ def _final_times(plan: Plan, title: str | None) -> Figure:
     for name, chosen in binding.items():
         style = _bar_style(name, legs)
         axes.add_collection(PolyCollection(list(bars[chosen]), **style), autolim=False)
-        label = _LABELS.get(name, name)
+        label = ALL_LABELS.get(name, name)
         handles.append(Patch(label=label if name else "no limit binds", **style))
     if legs <= MOST_WRITTEN:
         for leg, height in enumerate(heights):
@@ -265,7 +264,7 @@ def _bar_style(name: str, legs: int) -> dict[str, Any]:
         edge = {"edgecolor": "white", "linewidth": 0.6}
     if not name:
         return {"facecolor": FAINT, **edge}
-    number = list(_LABELS).index(name) if name in _LABELS else len(_LABELS)
+    number = list(ALL_LABELS).index(name) if name in ALL_LABELS else len(ALL_LABELS)
     return {
         "facecolor": COLOURS(SHADES[number % len(SHADES)]),
         "hatch": HATCHES[number % len(HATCHES)] if legs <= MOST_HATCHED else None,

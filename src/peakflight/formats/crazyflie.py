@@ -4,10 +4,13 @@ A row holds a duration, s, then eight ascending coefficients in piece-local time
 z, m, and yaw, rad.
 """
 
+import math
+
 import numpy as np
 
 from peakflight.errors import InvalidProblem
 from peakflight.files import PathLike, write_atomically
+from peakflight.formats.coarser import coarsened
 from peakflight.formats.heading import heading
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
@@ -16,6 +19,8 @@ DEGREE = 7
 """Of every polynomial in the file."""
 MEMORY_PIECES = 31
 """What 4096 bytes hold of pieces with 33 numbers of 4 bytes, all trajectories on board together."""
+SAME_YAW = 1e-6
+"""Difference of yaw, rad, below which the file has the plan's."""
 LEAST_PIECES = 2
 """The loader of Crazyswarm2 fails on a file of one row."""
 HEADER = ",".join(
@@ -26,8 +31,10 @@ HEADER = ",".join(
 def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
     """Write the pieces of a plan, padded to degree 7; a single piece becomes two, exactly.
 
-    Yaw turns from waypoint to waypoint as `heading` says, or is zero. Numbers have 9 significant
-    digits, which costs some 3e-8 m, and 1e-7 m on pieces of 4 s.
+    Yaw is that of `heading`. A yaw motion has finer pieces than the flight: on each of the flight's
+    the polynomial of degree 7 nearest to it, with the same yaw, rate and acceleration at both ends;
+    a note says how far off that is. Numbers have 9 significant digits, which costs some 3e-8 m, and
+    1e-7 m on pieces of 4 s.
 
     Returns
     -------
@@ -46,9 +53,9 @@ def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
             f"the trajectory has degree {trajectory.degree}; a Crazyflie flies degree {DEGREE} "
             f"at most: plan with degree={DEGREE}"
         )
+    yaw, off = coarsened(heading(plan), trajectory.segment_times, DEGREE)
     coefficients = np.concatenate(
-        (trajectory.elevate(DEGREE).coefficients, heading(plan).elevate(DEGREE).coefficients),
-        axis=2,
+        (trajectory.elevate(DEGREE).coefficients, yaw.coefficients), axis=2
     )
     flight = Trajectory(coefficients, trajectory.segment_times, trajectory.start_time)
     if len(flight) < LEAST_PIECES:
@@ -60,11 +67,16 @@ def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
     row = ",".join(["%.9g"] * rows.shape[1])
     lines = [HEADER, *(row % tuple(values) for values in (rows + 0.0).tolist())]
     write_atomically(path, "\n".join(lines) + "\n")
-    return _notes(plan, pieces)
+    return _notes(plan, pieces, off)
 
 
-def _notes(plan: Plan, pieces: int) -> tuple[str, ...]:
+def _notes(plan: Plan, pieces: int, off: float) -> tuple[str, ...]:
     notes = []
+    if off > SAME_YAW:
+        notes.append(
+            f"its yaw is up to {math.degrees(off):.2g} deg off the plan's, which has finer pieces, "
+            "and not proven to keep the yaw limits"
+        )
     if pieces > MEMORY_PIECES:
         notes.append(
             f"{pieces} pieces: the memory of a Crazyflie holds {MEMORY_PIECES}, and its firmware "

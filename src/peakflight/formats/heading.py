@@ -1,4 +1,4 @@
-"""The heading that flight files give a plan: smooth from waypoint to waypoint, at rest at each."""
+"""The heading that flight files give a plan: its yaw motion, or what plans without one fly."""
 
 import numpy as np
 
@@ -7,16 +7,21 @@ from peakflight.trajectory import Trajectory
 
 
 def heading(plan: Plan) -> Trajectory:
-    """Yaw along a plan, (K, 4, 1) in rad over its own pieces; zero if its problem has none.
+    """Yaw along a plan in rad: its yaw motion, over pieces of its own; zero if none is asked for.
 
-    Each leg turns the shorter way from the yaw of its first waypoint to that of its last, by
-    3 s^2 - 2 s^3 of the turn where s is the part of the leg's time that has passed. So turning
-    begins and ends at rest at every waypoint, whatever the number of pieces in a leg.
+    A plan file from before there were yaw motions has a yaw at waypoints, but none between them:
+    (K, 4, 1) then, over the pieces of the plan. Each leg turns the shorter way from the yaw of its
+    first waypoint to that of its last, by 3 s^2 - 2 s^3 of the turn where s is the part of the
+    leg's time that has passed. So turning begins and ends at rest at every waypoint, whatever the
+    number of pieces in a leg.
     """
+    if plan.yaw_motion is not None:
+        return plan.yaw_motion
     trajectory = plan.trajectory
     coefficients = np.zeros((len(trajectory), 4, 1))
-    if plan.problem.yaw is not None:
-        yaw = np.unwrap(plan.problem.yaw)
+    asked = plan.problem.heading
+    if asked is not None and asked.angles is not None:
+        yaw = np.unwrap(asked.angles)
         leg = np.repeat(np.arange(len(plan.pieces)), plan.pieces)
         begins, lasts = plan.waypoint_times[leg], np.diff(plan.waypoint_times)[leg]
         turn = np.diff(yaw)[leg]

@@ -29,8 +29,9 @@ def read(text: str, path: PathLike) -> Course:
     root = parse_json(text, path)
     if isinstance(root, dict) and "coefficients" in root:
         problem = root.get("problem")
+        yaw = problem.get("yaw") if isinstance(problem, dict) else None
         root = {
             "waypoints": root.get("waypoints"),
-            "yaw": problem.get("yaw") if isinstance(problem, dict) else None,
+            "yaw": yaw.get("angles") if isinstance(yaw, dict) else yaw,
         }
     return course_from(Tree(root, path))

@@ -16,6 +16,7 @@ MOST_ROWS = 5_000_000
 """A file of a gigabyte; more is a slip in the rate."""
 PREFIXES = ("", "v", "a", "j", "s")
 """Of the columns of position, velocity, acceleration, jerk and snap."""
+YAW_COLUMNS = ("yaw [rad]", "yaw_rate [rad/s]", "yaw_acceleration [rad/s^2]")
 UNITS = ("m", "m/s", "m/s^2", "m/s^3", "m/s^4")
 NEAR_END = 1e-3
 """A sample this part of a period before the end is the end: both would print the same time."""
@@ -25,8 +26,9 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
     """Write time, position, velocity, acceleration, jerk, snap and yaw, one row a sample.
 
     Samples begin at the start time and follow each other by 1/rate; the last one is at the end,
-    wherever that falls. Yaw is there if the problem has it. Times have 15 significant digits,
-    so that they stay apart whatever the start time, other numbers 9.
+    wherever that falls. Yaw, its rate and its acceleration are there if the plan has a yaw
+    motion. Times have 15 significant digits, so that they stay apart whatever the start time,
+    other numbers 9.
 
     Parameters
     ----------
@@ -51,8 +53,9 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
     for prefix, unit in zip(PREFIXES, UNITS, strict=True):
         names += [f"{prefix}{axis} [{unit}]" for axis in AXES]
     if plan.problem.yaw is not None:
-        columns.append(heading(plan)(times).T)
-        names.append("yaw [rad]")
+        orders = range(1 if plan.yaw_motion is None else len(YAW_COLUMNS))
+        columns += [heading(plan)(times, derivative=order).T for order in orders]
+        names += YAW_COLUMNS[: len(orders)]
     table = np.vstack(columns).T + 0.0  # no negative zeros
     row = "%.15g" + ",%.9g" * (table.shape[1] - 1)
     lines = [",".join(names), *(row % tuple(values) for values in table.tolist())]
