@@ -236,6 +236,80 @@ class TestPlan:
         assert plan.problem.yaw is not None
         assert list(plan.problem.yaw) == [0.0, 0.5, 1.0]
 
+    def test_yaw_is_planned_proven_and_in_every_file(self, run: Run, folder: Path) -> None:
+        limits = ("--yaw-limits", "rate=2,acceleration=10")
+        result = run("plan", "lap.csv", "-o", "out", "--yaw", "velocity", *limits)
+        assert result.exit_code == 0
+        assert names(folder / "out") == DATA | PICTURES | {"yaw.png"}
+        for words in (
+            "yaw: velocity; limits: rate=2,acceleration=10",
+            "yaw rate                2 rad/s",
+            "deg off the direction it follows",
+            "note: crazyflie.csv: its yaw is up to",
+        ):
+            assert words in result.stdout
+        plan = pf.Plan.load(folder / "out" / "plan.json")
+        assert plan.problem.heading == pf.Heading(policy="velocity", rate=2.0, acceleration=10.0)
+        assert plan.report.peaks["yaw_rate"].max() <= 1.0
+        header = (folder / "out" / "samples.csv").read_text().split("\n", 1)[0]
+        assert header.endswith("yaw [rad],yaw_rate [rad/s],yaw_acceleration [rad/s^2]")
+        checked = run("check", "out/plan.json")
+        assert checked.exit_code == 0
+        assert "yaw acceleration" in checked.stdout
+        worst = json.loads(run("check", "out/plan.json", "--json").stdout)["worst"]
+        assert worst["yaw_rate"]["limit"] == 2.0
+
+    def test_check_finds_a_yaw_that_was_changed(self, run: Run, folder: Path) -> None:
+        assert run("plan", "lap.csv", "-o", "out", *QUICK, "--yaw", "point:1,1,0").exit_code == 0
+        path = folder / "out" / "plan.json"
+        yaw = json.loads(path.read_text())["yaw"]
+        yaw["coefficients"][3][1][0] += 10.0
+        edit(path, yaw=yaw)
+        result = run("check", path)
+        assert result.exit_code == 1
+        assert "claims to be feasible, but is not: yaw rate reaches" in result.stderr
+        edit(path, yaw=None)
+        assert "there is no yaw motion" in run("check", path).stderr
+
+    @pytest.mark.parametrize(
+        ("text", "angle"), [("90deg", np.pi / 2), ("-1.5", -1.5), ("-180deg", -np.pi)]
+    )
+    def test_fixed_yaw(self, text: str, angle: float, run: Run, folder: Path) -> None:
+        assert run("plan", "lap.csv", *QUICK, "--yaw", text).exit_code == 0
+        plan = pf.Plan.load(folder / "lap-plan" / "plan.json")
+        assert plan.yaw(0.1) == pytest.approx(angle)
+
+    def test_yaw_of_the_course_under_limits(self, run: Run, folder: Path) -> None:
+        Path("t.csv").write_text("x,y,z,yaw\n0,0,1,0\n1,0,1,3\n2,1,1,0\n")
+        for options in (("--yaw", "waypoints"), ("--yaw-limits", "rate=1")):
+            result = run("plan", "t.csv", *QUICK, *options)
+            assert result.exit_code == 0
+            assert "note: slowed down by" in result.stdout
+        plan = pf.Plan.load(folder / "t-plan" / "plan.json")
+        assert plan.problem.heading.acceleration is None
+        again = run("plan", "t-plan/plan.json", "-o", "again", *QUICK, "--yaw", "waypoints")
+        assert again.exit_code == 0
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (("--yaw", "north"), "yaw is 'north'; it must be an angle in rad or such as 90deg"),
+            (("--yaw", "point:1,2"), "point:x,y,z with three numbers"),
+            (("--yaw", "point:1,2,nan"), "a coordinate of the yaw point = nan; it must be finite"),
+            (("--yaw", "inf"), "yaw = inf; it must be finite"),
+            (("--yaw", "waypoints"), "the yaw of the course, which has none; give a --yaw"),
+            (("--yaw-limits", "rate=1"), "the yaw of the course, which has none; give a --yaw"),
+            (
+                ("--yaw", "1", "--yaw-limits", "rate=-1"),
+                "limit yaw_rate is -1; it must be positive",
+            ),
+            (("--yaw", "1", "--yaw-limits", "speed=1"), "unknown limit 'speed'; known are rate"),
+            (("--yaw", "1", "--yaw-limits", "rate"), "'rate' is not a limit; write name=value"),
+        ],
+    )
+    def test_bad_yaw_is_one_line(self, options: tuple[str, ...], words: str, run: Run) -> None:
+        refused(run("plan", "lap.csv", *QUICK, *options), words)
+
     def test_near_equal_waypoints_are_merged_with_a_note(self, run: Run, folder: Path) -> None:
         write_course(Path("near.csv"), [*WAYPOINTS, [3.2, 1.2, 1.4005], [5, 1, 1]])
         result = run("plan", "near.csv", *QUICK)

@@ -41,15 +41,16 @@ class Heading:
     angle: float | None = None
     """Of policy fixed: yaw during the whole flight, rad."""
     angles: tuple[float, ...] | None = None
-    """Of policy waypoints: (K+1,) yaw at each waypoint, rad; turned to the shorter way."""
+    """Of policy waypoints: (K+1,) yaw at each waypoint, rad; the nose turns the shorter way."""
     point: tuple[float, float, float] | None = None
     """Of policy point: what to look at, m; its height does not matter."""
     rate: float | None = 3.0
-    """Most that the yaw may turn, rad/s; None does not limit. What motion-capture flights with a
-    camera bear; small vehicles turn three times as fast."""
+    """Fastest that the nose may turn, rad/s; None does not limit. The default is half a turn in
+    about a second."""
     acceleration: float | None = 20.0
-    """Most that the rate may change, rad/s^2; None does not limit. Yaw is the weakest axis of a
-    quadrotor: it turns by the drag of the rotors alone."""
+    """Fastest that the rate may change, rad/s^2; None does not limit. By default the nose reaches
+    the default rate in 0.15 s; yaw is the weakest axis of a quadrotor, which the drag of its rotors
+    alone turns."""
 
     def __post_init__(self) -> None:
         if self.policy not in ASKED:
@@ -76,7 +77,7 @@ class Heading:
                 raise InvalidProblem(f"the yaw point has {len(point)} numbers; it must have 3")
             object.__setattr__(self, "point", point)
         for kind in YAW_KINDS:
-            limit = getattr(self, _field(kind))
+            limit = getattr(self, heading_field(kind))
             if limit is not None:
                 value = _finite(f"limit {kind.name}", limit, LARGEST)
                 if not value >= SMALLEST:
@@ -84,12 +85,12 @@ class Heading:
                         f"limit {kind.name} is {value:g}; it must be positive, from {SMALLEST:g} "
                         f"to {LARGEST:g}"
                     )
-                object.__setattr__(self, _field(kind), value)
+                object.__setattr__(self, heading_field(kind), value)
 
     @property
     def limits(self) -> dict[LimitKind, float]:
         """The kinds of `YAW_KINDS` that are limited, with their limits."""
-        values = {kind: getattr(self, _field(kind)) for kind in YAW_KINDS}
+        values = {kind: getattr(self, heading_field(kind)) for kind in YAW_KINDS}
         return {kind: value for kind, value in values.items() if value is not None}
 
     @property
@@ -163,7 +164,7 @@ def unwrapped(angles: np.ndarray) -> np.ndarray:
     return angles[0] + np.concatenate(([0.0], np.cumsum(turns)))
 
 
-def _field(kind: LimitKind) -> str:
+def heading_field(kind: LimitKind) -> str:
     """The field of a heading that limits a kind."""
     return kind.name.removeprefix("yaw_")
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from peakflight.cli.options import written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
+from peakflight.cli.yaw_options import written_yaw
 from peakflight.result import Plan
 from peakflight.yaw import ALL_LABELS
 
@@ -44,6 +45,8 @@ def print_plan(
     _print_notes(out, before)
     source = " (the paper's)" if default_limits else ""
     out.path(f"limits{source}: {written(plan.problem.limits)}")
+    if plan.problem.heading is not None:
+        out.path(f"yaw: {written_yaw(plan.problem.heading)}")
     out.line()
     method = f"{plan.method}, variant {variant}" if variant else plan.method
     proof = "yes, at every instant" if plan.feasible else "no"

@@ -9,7 +9,7 @@ import numpy as np
 
 from peakflight.cli.options import named_values
 from peakflight.errors import InvalidProblem, quoted
-from peakflight.yaw import YAW_KINDS, Heading
+from peakflight.yaw import YAW_KINDS, Heading, heading_field
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -41,6 +41,19 @@ def yaw_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return command
+
+
+def written_yaw(heading: Heading) -> str:
+    """What is asked of the yaw, for people."""
+    asked = heading.policy
+    if heading.angle is not None:
+        asked = f"{math.degrees(heading.angle):.6g} deg"
+    elif heading.point is not None:
+        asked = POINT + ",".join(f"{value:g}" for value in heading.point)
+    limits = ",".join(
+        f"{heading_field(kind)}={value:.6g}" for kind, value in heading.limits.items()
+    )
+    return f"{asked}; limits: {limits or 'none'}"
 
 
 def heading_of(
@@ -103,7 +116,7 @@ def parse_yaw_limits(text: str) -> dict[str, float | None]:
     InvalidProblem
         If an item is not name=value, a name is unknown or given twice, or a value against a rule.
     """
-    kinds = {kind.name.removeprefix("yaw_"): kind for kind in YAW_KINDS}
+    kinds = {heading_field(kind): kind for kind in YAW_KINDS}
     limits = dict.fromkeys(kinds) | named_values(text, kinds)
     Heading(policy="velocity", **limits)  # type: ignore[arg-type]
     return limits
