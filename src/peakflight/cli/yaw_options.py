@@ -50,10 +50,8 @@ def written_yaw(heading: Heading) -> str:
         asked = f"{math.degrees(heading.angle):.6g} deg"
     elif heading.point is not None:
         asked = POINT + ",".join(f"{value:g}" for value in heading.point)
-    limits = ",".join(
-        f"{heading_field(kind)}={value:.6g}" for kind, value in heading.limits.items()
-    )
-    return f"{asked}; limits: {limits or 'none'}"
+    limits = [f"{heading_field(kind)}={value:.6g}" for kind, value in heading.limits.items()]
+    return f"{asked}; limits: {','.join(limits) or 'none'}"
 
 
 def heading_of(
