@@ -29,7 +29,6 @@ from peakflight.figures.derivatives import (
 from peakflight.limits import plain_unit
 from peakflight.result import Plan
 from peakflight.yaw import YAW_KINDS
-from peakflight.yaw_motion import followed, sample_times
 
 HEIGHTS = (1.7, 1.05, 1.05)
 """Of the panels from the top, in."""
@@ -91,6 +90,8 @@ def _draw_yaw(axes: Axes, plan: Plan, times: np.ndarray) -> None:
     assert heading is not None
     assert motion is not None
     if heading.follows:
+        from peakflight.yaw_motion import followed, sample_times
+
         at = motion.start_time + sample_times(motion.segment_times)
         target, _ = followed(heading, plan.trajectory, at)
         turns = np.round((float(plan.yaw(at[0])) - target[0]) / (2.0 * np.pi))
