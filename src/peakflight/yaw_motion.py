@@ -86,18 +86,19 @@ def _through(
 ) -> Turning:
     """The yaw of least squared acceleration through (n,) angles at (n,) knots."""
     free, fixed = spline.eliminated(marks, angles)
-    bounds = _bounds(heading, spline, free, fixed)
-    x = _smoothest(spline, free, fixed, bounds._replace(fixed=np.full(len(bounds.fixed), np.inf)))
+    bounds, order = _bounds(heading, spline, free, fixed)
+    x = _smoothest(spline, free, fixed, bounds._replace(fixed=np.full(len(order), np.inf)))
     stretch = 1.0
     if x is not None:
         values = np.abs(bounds.rows @ x + bounds.offset) / bounds.fixed
-        stretch = float((values ** (1.0 / bounds.growing)).max(initial=1.0))
+        stretch = float((values ** (1.0 / order)).max(initial=1.0))
     if stretch > 1.0:  # it does for this spline, but another may do with less
-        stretched = spline.stretched(stretch)
-        scale = _least_scale(_bounds(heading, stretched, free, fixed), 1.0 / stretch)
+        bounds, order = _bounds(heading, spline.stretched(stretch), free, fixed)
+        scale = _least_scale(bounds, order, 1.0 / stretch)
         stretch = max(1.0, stretch * min(1.0, scale * (1.0 + CAUTION)))
         spline = spline.stretched(stretch)
-        x = _smoothest(spline, free, fixed, _bounds(heading, spline, free, fixed))
+        bounds, _ = _bounds(heading, spline, free, fixed)
+        x = _smoothest(spline, free, fixed, bounds)
     if x is None:
         return Turning(None, 1.0, 0.0)
     control = free @ x + fixed
@@ -112,14 +113,14 @@ def _smoothest(
     return least_squares(sparse.csr_array(rows @ free), -(rows @ fixed), bounds)
 
 
-def _least_scale(bounds: Bounds, enough: float) -> float:
+def _least_scale(bounds: Bounds, order: np.ndarray, enough: float) -> float:
     """Least part of the time in which bounds can be kept, 1 if no less is found.
 
     Or one below `enough`. In a part s of the time the limits allow s times the rate and s^2 times
     the acceleration. The latter is not linear in s; its tangent at the last s is below it, so what
     each round finds is feasible, and no worse than the last.
     """
-    is_squared = bounds.growing == 2.0
+    is_squared = order == 2.0
     last = 1.0
     for _ in range(ROUNDS):
         tangent = bounds._replace(
@@ -147,7 +148,8 @@ def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> T
     rows = sparse.vstack((sparse.diags_array(weights) @ basis, roughness)) @ free
     wanted = np.concatenate((weights * (target - centre), np.zeros(roughness.shape[0])))
     offset = np.zeros(free.shape[0])
-    x = least_squares(sparse.csr_array(rows), wanted, _bounds(heading, spline, free, offset))
+    bounds, _ = _bounds(heading, spline, free, offset)
+    x = least_squares(sparse.csr_array(rows), wanted, bounds)
     if x is None:
         return Turning(None, 1.0, np.nan)
     control = free @ x + centre
@@ -193,10 +195,12 @@ def directions(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _bounds(
     heading: Heading, spline: "_Spline", free: sparse.csr_array, fixed: np.ndarray
-) -> Bounds:
+) -> tuple[Bounds, np.ndarray]:
     """Limits of rate and acceleration on x, where the control points are free x + fixed.
 
-    Rows are relative to the limits; `growing` holds the order of the derivative.
+    Returns
+    -------
+    Bounds relative to the limits, and (m,) the order of the derivative that each is about.
     """
     rows, offsets, orders = [], [], []
     for kind, limit in heading.limits.items():
@@ -206,10 +210,11 @@ def _bounds(
         orders.append(np.full(differences.shape[0], float(kind.order)))
     if not rows:
         empty = np.zeros(0)
-        return Bounds(sparse.csr_array((0, free.shape[1])), empty, empty, empty)
-    growing = np.concatenate(orders)
-    room = np.full(len(growing), 1.0 - SAFETY)
-    return Bounds(sparse.csr_array(sparse.vstack(rows)), np.concatenate(offsets), room, growing)
+        return Bounds(sparse.csr_array((0, free.shape[1])), empty, empty, empty), empty
+    order = np.concatenate(orders)
+    room = np.full(len(order), 1.0 - SAFETY)
+    every = sparse.csr_array(sparse.vstack(rows))
+    return Bounds(every, np.concatenate(offsets), room, np.zeros(len(order))), order
 
 
 class _Spline(NamedTuple):
@@ -226,6 +231,7 @@ class _Spline(NamedTuple):
 
     @classmethod
     def of(cls, segment_times: np.ndarray) -> "_Spline":
+        """Knots for a flight of (K,) s pieces."""
         counts = np.clip(np.ceil(segment_times / SPACING), *PARTS).astype(np.int64)
         firsts = np.concatenate(([0], np.cumsum(counts)))
         return cls._on(np.repeat(segment_times / counts, counts), firsts)
@@ -246,6 +252,7 @@ class _Spline(NamedTuple):
         )
 
     def stretched(self, factor: float) -> "_Spline":
+        """The same knots with all times multiplied."""
         return self if factor == 1.0 else self._on(self.parts * factor, self.firsts)
 
     def basis(self, times: np.ndarray) -> sparse.csr_array:
