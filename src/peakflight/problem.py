@@ -295,19 +295,7 @@ def fixed_state(
 
     Orders that are not given are zero up to `zeros`, and free beyond.
     """
-    if state is None:
-        state = {}
-    if isinstance(state, Mapping):
-        rows = {_order(name, key): value for key, value in state.items()}
-    else:
-        try:
-            numbers = [[_number(x) for x in row] for row in state]  # type: ignore[union-attr]
-        except TypeError:
-            raise InvalidProblem(
-                f"{name} is {state!r}; it must be rows of {axes} numbers"
-            ) from None
-        array = as_float_array(name, numbers or np.empty((0, axes)), (None, axes))
-        rows = dict(enumerate(array, start=1))
+    rows = {} if state is None else _rows(name, state, axes)
     count = max([zeros, *rows])
     if count >= degree:
         raise InvalidProblem(
@@ -316,11 +304,30 @@ def fixed_state(
     full = np.full((count, axes), math.nan)
     full[:zeros] = 0.0
     for order, row in rows.items():
-        full[order - 1] = as_float_array(f"{name} derivative {order}", row, (axes,))
+        full[order - 1] = row
     if np.isinf(full).any():
         raise InvalidProblem(f"{name} has an infinite derivative")
     full.setflags(write=False)
     return full
+
+
+def _rows(name: str, state: StateLike, axes: int) -> dict[int, np.ndarray]:
+    """Order to (axes,) of the derivatives that are given, by name, by order or row by row."""
+    if isinstance(state, Mapping):
+        return {
+            order: as_float_array(f"{name} derivative {order}", row, (axes,))
+            for order, row in ((_order(name, key), row) for key, row in state.items())
+        }
+    rows: Any = state
+    if not (isinstance(state, np.ndarray) and state.dtype == np.float64):
+        try:
+            numbers = [[_number(x) for x in row] for row in state]  # type: ignore[union-attr]
+            rows = numbers or np.empty((0, axes))
+        except TypeError:
+            raise InvalidProblem(
+                f"{name} is {state!r}; it must be rows of {axes} numbers"
+            ) from None
+    return dict(enumerate(as_float_array(name, rows, (None, axes)), start=1))
 
 
 def _order(name: str, key: str | int) -> int:
