@@ -444,6 +444,7 @@ class TestOutputFolder:
 
     def test_name_too_long(self, run: Run, folder: Path) -> None:
         refused(run("plan", "lap.csv", "-o", f"new/{'a' * 300}"), "cannot be written to")
+        refused(run("plan", "lap.csv", "-o", ""), "the name is empty")
         assert names(folder) == {"lap.csv"}
 
     def test_a_folder_where_a_file_should_go(self, run: Run, folder: Path) -> None:

@@ -11,7 +11,7 @@ import click
 from peakflight.cli.compare_output import print_comparisons
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, file_name
-from peakflight.cli.options import common_options, limits_option, spline_options
+from peakflight.cli.options import FolderPath, common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
@@ -63,7 +63,7 @@ def _methods(
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FolderPath(),
     metavar="DIR",
     help=f"Folder for {TABLE_FILE}, {DATA_FILE} and the pictures; by default none is written.",
 )
@@ -222,6 +222,20 @@ def _write(
     return {"table": folder.published(TABLE_FILE), "data": folder.published(DATA_FILE)}
 
 
+def _stems(comparisons: Sequence["Comparison"]) -> list[str]:
+    """What files of each course begin with; no two alike, even where case does not count."""
+    stems: list[str] = []
+    for one in comparisons:
+        stem = name = file_name(one.name)
+        taken = {other.lower() for other in stems}
+        number = 1
+        while stem.lower() in taken:
+            number += 1
+            stem = f"{name}-{number}"
+        stems.append(stem)
+    return stems
+
+
 def _draw(
     comparisons: Sequence["Comparison"], folder: OutputFolder, progress: Progress
 ) -> tuple[dict[str, Path], tuple[str, ...]]:
@@ -231,13 +245,8 @@ def _draw(
     except MissingExtra as error:
         return {}, (f"no pictures: {error}",)
     files, remarks = {}, []
-    stems: Counter[str] = Counter()
-    for done, one in enumerate(comparisons):
+    for done, (one, stem) in enumerate(zip(comparisons, _stems(comparisons), strict=True)):
         progress.stage(f"drawing {one.name}", done / len(comparisons))
-        stem = file_name(one.name)
-        stems[stem.lower()] += 1  # some systems do not tell small letters from large ones
-        if stems[stem.lower()] > 1:
-            stem = f"{stem}-{stems[stem.lower()]}"
         plans = {row.method: row.plan for row in one.rows if row.certified and row.plan is not None}
         if not plans:
             remarks.append(f"no pictures of {one.name}: no method has a certified plan")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -10,6 +11,19 @@ from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, LimitKind, Limits
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+class FolderPath(click.Path):
+    """A folder that may not exist yet."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As a `Path`; an empty name would be the current folder."""
+        if not str(value).strip():
+            self.fail("the name is empty; write . for the current folder", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 def parse_limits(text: str) -> Limits:

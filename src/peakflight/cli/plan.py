@@ -8,7 +8,7 @@ import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import common_options, limits_option, spline_options
+from peakflight.cli.options import FolderPath, common_options, limits_option, spline_options
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
@@ -100,7 +100,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FolderPath(),
     metavar="DIR",
     help="Folder for the files; by default COURSE-plan, after the name of the course.",
 )
