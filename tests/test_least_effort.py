@@ -19,11 +19,12 @@ from peakflight import (
     stretch_to_limits,
 )
 from peakflight.kernels import basis
-from peakflight.methods import bry, mellinger
+from peakflight.methods import METHODS, bry, mellinger
 from peakflight.methods.least_effort import DescentSettings, descend
 from peakflight.spline import SplineTask
 
-COURSES = sorted((Path(__file__).parent.parent / "examples" / "courses").glob("*.json"))
+FOLDER = Path(__file__).parent.parent / "examples" / "courses"
+COURSES = {path.stem: path for path in sorted(FOLDER.iterdir()) if path.suffix != ".md"}
 JERK = {"limits": Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)}
 SNAP = {
     "limits": Limits(speed=5.0, thrust_acceleration=14.5, jerk=54.0, snap=800.0),
@@ -55,7 +56,7 @@ SHORT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
 """m."""
 
 every_case = pytest.mark.parametrize("case", CASES)
-every_course = pytest.mark.parametrize("path", COURSES, ids=lambda path: path.stem)
+every_course = pytest.mark.parametrize("path", COURSES.values(), ids=COURSES)
 
 
 def random_course(legs, seed):
@@ -310,7 +311,7 @@ def test_bry_is_mellinger_where_slowing_down_keeps_the_path(name, path):
 
 
 def test_bry_is_not_mellinger_where_it_does_not():
-    waypoints = read_course(COURSES[0].parent / "tight_then_fast.json").waypoints
+    waypoints = read_course(COURSES["tight_then_fast"]).waypoints
     for options in (MIXED, {**JERK, **MOVING}):
         one, other = (plan(waypoints, method=m, **options) for m in ("mellinger", "bry"))
         assert abs(one.duration / other.duration - 1.0) > 1e-3
@@ -339,6 +340,17 @@ def test_peak_is_no_slower(name, path):
     best = plan(waypoints, method="peak", **CLASSES[name]).duration
     for method in ("proportional", "mellinger", "bry"):
         assert best <= plan(waypoints, method=method, **CLASSES[name]).duration * (1.0 + 5e-4)
+
+
+@every_course
+@pytest.mark.parametrize("options", [JERK, SNAP], ids=["jerk", "snap"])
+def test_joint_is_the_fastest(options, path):
+    """Of every method, by its defaults, on every public course and at the paper's limits."""
+    waypoints = read_course(path).waypoints
+    rows = {method: plan(waypoints, method=method, **options) for method in METHODS}
+    assert all(made.feasible for made in rows.values())
+    best = rows.pop("joint").duration
+    assert all(best < made.duration for made in rows.values())
 
 
 @both
