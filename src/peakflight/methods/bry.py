@@ -51,7 +51,7 @@ class Settings(DescentSettings):
 
     time_penalty: float | None = None
     """c_t, in m^2/s^6 for jerk and m^2/s^8 for snap: the higher, the more aggressive; None raises
-    it until a limit is reached."""
+    it until a limit is reached. Refused if the total time is absurd: SHORTEST, LONGEST_ASKED."""
     closeness: float = 1e-3
     """Relative: how much the times could still be shortened when the search for c_t ends."""
 
