@@ -9,7 +9,7 @@ import pytest
 import peakflight as pf
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.formats import FLIGHT_WRITERS, read_course, write_crazyflie, write_samples
-from peakflight.formats.heading import heading
+from peakflight.heading import heading
 
 POSITION_ERROR = 3e-8
 """m, and m/s; what nine significant digits cost (ecosystem notes)."""

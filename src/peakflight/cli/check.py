@@ -57,7 +57,7 @@ def check(file: Path, limits: Limits | None, as_json: bool) -> int:
         report = certify_plan(plan)
         false_claims = _false_claims(values, plan, report)
         if limits is not None:
-            plan = replace(plan, problem=replace(plan.problem, limits=limits))
+            plan = replace(plan, problem=replace(plan.problem, limits=limits, vehicle=None))
             report = certify_plan(plan)
     if as_json:
         print_json(_as_dict(plan, report, false_claims))

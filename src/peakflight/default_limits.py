@@ -1,0 +1,96 @@
+"""Limits that follow from a vehicle's figures, where nobody has measured better ones.
+
+The rotors have to hold the vehicle up, turn it, and correct what goes wrong. One share of the top
+rotor thrust, `MARGIN`, is set aside for turning and correcting; every limit follows from that.
+"""
+
+import math
+
+from peakflight.airframe import Airframe
+from peakflight.errors import InvalidProblem
+from peakflight.limits import GRAVITY, Limits
+
+MARGIN = 0.15
+"""Share of the top thrust that is kept for turning and control: plans that held more than 85 to
+90 % of the top crashed in simulation, those below were flown."""
+
+
+def default_limits(
+    airframe: Airframe,
+    *,
+    rotor_thrust: tuple[float, float],
+    motor_lag: float,
+    body_rate: float | None,
+) -> tuple[Limits, dict[str, str]]:
+    """Limits that leave the rotors room to do what the limits themselves ask for.
+
+    Within the limits of thrust acceleration, least thrust acceleration and angular acceleration
+    every rotor stays in its range, as long as the vehicle does not turn about its thrust axis.
+
+    Parameters
+    ----------
+    rotor_thrust
+        Least and most of one rotor, N.
+    motor_lag
+        Time constant of the rotors, s; 0 if they are immediate.
+    body_rate
+        Largest rate that the vehicle may turn at across its thrust axis, rad/s.
+
+    Returns
+    -------
+    The limits, and name of limit to why it has its value.
+
+    Raises
+    ------
+    InvalidProblem
+        If the margin leaves too little to hover.
+    """
+    least, most = rotor_thrust
+    reserve = MARGIN * most
+    top = 4.0 * most / airframe.mass
+    thrust = (1.0 - MARGIN) * top
+    if thrust <= GRAVITY:
+        raise InvalidProblem(
+            f"top thrust acceleration is {top:.4g} m/s^2; less the margin of {MARGIN:.0%} that is "
+            f"{thrust:.4g}, which is not above gravity ({GRAVITY}); give the vehicle's limits"
+        )
+    lowest = 4.0 * (least + reserve) / airframe.mass
+    if lowest >= GRAVITY:
+        raise InvalidProblem(
+            f"least thrust acceleration with {MARGIN:.0%} of the top in reserve is {lowest:.4g} "
+            f"m/s^2, which is not below gravity ({GRAVITY}); give the vehicle's limits"
+        )
+    tilt = math.acos(GRAVITY / thrust)
+    turning = 4.0 * airframe.lever * reserve / (math.sqrt(2.0) * airframe.inertia)
+    stopping = math.sqrt(2.0 * turning * tilt)
+    rate = stopping if body_rate is None else min(stopping, (1.0 - MARGIN) * body_rate)
+    turned = rate * thrust
+    changed = (thrust - lowest) / motor_lag if motor_lag > 0.0 else math.inf
+    limits = Limits(
+        # Limits on the rotors themselves belong here: rotor_thrust=most, least_rotor_thrust=least,
+        # airframe=airframe.
+        thrust_acceleration=thrust,
+        least_thrust_acceleration=lowest,
+        tilt=tilt,
+        angular_acceleration=turning,
+        body_rate=rate,
+        jerk=min(turned, changed),
+        snap=turning * thrust,
+    )
+    kept = f"{MARGIN:.0%}"
+    reasons = {
+        "thrust_acceleration": f"{kept} below the top of {top:.4g} m/s^2, which turning and "
+        "control need",
+        "least_thrust_acceleration": f"each rotor at its least, {least:.3g} N, and {kept} of its "
+        "top above, which turning needs",
+        "tilt": "beyond, the limited thrust does not hold the height",
+        "angular_acceleration": f"what {kept} of each rotor's top thrust turns at, at any heading",
+        "body_rate": "the rate from which the vehicle can be stopped within its largest tilt"
+        if rate == stopping
+        else f"{kept} below the vehicle's own limit of {body_rate:.4g} rad/s",
+        "jerk": "the limited thrust turned at the limited body rate"
+        if turned <= changed
+        else f"from the least to the largest limited thrust in one motor lag, {motor_lag:.3g} s",
+        "snap": "the limited thrust turned at the limited angular acceleration",
+    }
+    return limits, reasons
