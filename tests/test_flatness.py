@@ -18,6 +18,7 @@ from peakflight.vehicle import Vehicle
 pytestmark = pytest.mark.kernels
 
 G = 9.81
+UP = np.array([0.0, 0.0, G])
 RACER = pf.VEHICLES["racing-quad"]
 PLUS = pf.VEHICLES["hummingbird"]
 ODD = Vehicle(
@@ -34,7 +35,7 @@ ODD = Vehicle(
 
 
 def motion_of(times):
-    """Position to the sixth derivative, (n, 3) each: smooth, wide turns, leaning up to 60 degrees."""
+    """Position to the sixth derivative, (n, 3) each: wide turns, leaning up to 60 degrees."""
     rates, phases = np.array([1.9, 1.4, 2.3]), np.array([0.3, 1.7, 0.0])
     sizes = np.array([2.2, 2.6, 0.7])
     angle = np.multiply.outer(times, rates) + phases
@@ -148,13 +149,13 @@ def test_rates_are_differences_of_attitude_and_angular_accelerations_of_rates(ve
 def twin(derivatives, vehicle, yaw):
     """One sample by matrices and the tilt's axis and angle; no closed form of the kernel in it."""
     velocity, acceleration = derivatives[:2]
-    force = vehicle.mass * (acceleration + [0.0, 0.0, G]) + vehicle.drag[0] * velocity
+    force = vehicle.mass * (acceleration + UP) + vehicle.drag[0] * velocity
     axis = force / np.linalg.norm(force)
     hinge = np.cross([0.0, 0.0, 1.0], axis)
     sine = np.linalg.norm(hinge)
     turn = hinge / sine * math.atan2(sine, axis[2]) if sine > 0.0 else hinge
     attitude = Rotation.from_rotvec(turn) * Rotation.from_rotvec([0.0, 0.0, yaw])
-    carried = vehicle.mass * (acceleration + [0.0, 0.0, G])
+    carried = vehicle.mass * (acceleration + UP)
     rotation = attitude.as_matrix()
     drag = np.diag([vehicle.drag[0], vehicle.drag[0], vehicle.drag[1]])
     lift = rotation.T @ (carried + rotation @ drag @ rotation.T @ velocity)

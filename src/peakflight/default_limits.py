@@ -13,6 +13,8 @@ from peakflight.limits import GRAVITY, Limits
 MARGIN = 0.15
 """Share of the top thrust that is kept for turning and control: plans that held more than 85 to
 90 % of the top crashed in simulation, those below were flown."""
+DIGITS = 4
+"""Of a limit, but tilt, which is to a tenth of a degree; rounded to the safe side."""
 
 
 def default_limits(
@@ -25,7 +27,8 @@ def default_limits(
     """Limits that leave the rotors room to do what the limits themselves ask for.
 
     Within the limits of thrust acceleration, least thrust acceleration and angular acceleration
-    every rotor stays in its range, as long as the vehicle does not turn about its thrust axis.
+    every rotor of a vehicle with J_x = J_y and no drag stays in its range at any heading, as long
+    as it does not turn about its thrust axis: what yaw and drag cost comes out of the margin.
 
     Parameters
     ----------
@@ -48,20 +51,20 @@ def default_limits(
     least, most = rotor_thrust
     reserve = MARGIN * most
     top = 4.0 * most / airframe.mass
-    thrust = (1.0 - MARGIN) * top
+    thrust = _below((1.0 - MARGIN) * top)
     if thrust <= GRAVITY:
         raise InvalidProblem(
             f"top thrust acceleration is {top:.4g} m/s^2; less the margin of {MARGIN:.0%} that is "
             f"{thrust:.4g}, which is not above gravity ({GRAVITY}); give the vehicle's limits"
         )
-    lowest = 4.0 * (least + reserve) / airframe.mass
+    lowest = -_below(-4.0 * (least + reserve) / airframe.mass)
     if lowest >= GRAVITY:
         raise InvalidProblem(
             f"least thrust acceleration with {MARGIN:.0%} of the top in reserve is {lowest:.4g} "
             f"m/s^2, which is not below gravity ({GRAVITY}); give the vehicle's limits"
         )
     tilt = math.acos(GRAVITY / thrust)
-    turning = 4.0 * airframe.lever * reserve / (math.sqrt(2.0) * airframe.inertia)
+    turning = _below(4.0 * airframe.lever * reserve / (math.sqrt(2.0) * airframe.inertia))
     stopping = math.sqrt(2.0 * turning * tilt)
     rate = stopping if body_rate is None else min(stopping, (1.0 - MARGIN) * body_rate)
     turned = rate * thrust
@@ -71,11 +74,11 @@ def default_limits(
         # airframe=airframe.
         thrust_acceleration=thrust,
         least_thrust_acceleration=lowest,
-        tilt=tilt,
+        tilt=math.radians(math.floor(10.0 * math.degrees(tilt)) / 10.0),
         angular_acceleration=turning,
-        body_rate=rate,
-        jerk=min(turned, changed),
-        snap=turning * thrust,
+        body_rate=_below(rate),
+        jerk=_below(min(turned, changed)),
+        snap=_below(turning * thrust),
     )
     kept = f"{MARGIN:.0%}"
     reasons = {
@@ -94,3 +97,9 @@ def default_limits(
         "snap": "the limited thrust turned at the limited angular acceleration",
     }
     return limits, reasons
+
+
+def _below(value: float) -> float:
+    """The next number of `DIGITS` digits below: limits are read by people."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - DIGITS)
+    return float(f"{math.floor(value / unit) * unit:.{DIGITS}g}")

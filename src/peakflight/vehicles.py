@@ -17,7 +17,7 @@ SUFFIXES = (".yaml", ".yml", ".json")
 
 GYRO = math.radians(2000.0)
 """Range of the gyroscope of every Crazyflie, rad/s."""
-CRAZYFLOW = "crazyflow 0.4, first-principles parameters {}, identified in flight"
+CRAZYFLOW = "crazyflow 0.4, {}"
 
 
 def _square(lever: float) -> tuple[tuple[float, float], ...]:
@@ -37,12 +37,12 @@ def _crazyflie(name: str, parameters: str, *, inertia_source: str = "", **figure
         "mass": f"{found}, with battery and markers",
         "inertia": f"{found}{inertia_source}",
         "rotor_positions": found,
-        "spins": "Bitcraze: motors 1 and 3 turn counterclockwise; crazyflow's mixing matrix agrees",
+        "spins": f"{found}: mixing matrix",
         "rotor_thrust": found,
         "torque_per_thrust": f"{found}: torque over thrust at the top",
         "motor_lag": f"{found}: rotors speeding up from hovering, linearised",
         "body_rate": "range of the gyroscope, 2000 deg/s (Bosch BMI088)",
-        "drag": f"{found}: drag matrix, which its dynamics apply as a force",
+        "drag": f"{found}: drag matrix, a force in its dynamics",
     }
     return Vehicle(
         name=name,
@@ -103,7 +103,7 @@ _BRUSHLESS = _crazyflie(
     drag=(0.02149, 0.02360),
 )
 
-_CPC = "Foehn, Romero, Scaramuzza 2021, uzh-rpg/rpg_time_optimal quads/quad.yaml"
+_CPC = "Foehn et al. 2021, uzh-rpg/rpg_time_optimal quads/quad.yaml"
 _ARM = 0.15 / math.sqrt(2.0)
 _RACER = Vehicle(
     name="racing-quad",
@@ -128,7 +128,7 @@ _RACER = Vehicle(
     },
 )
 
-_ROTORS = "RotorS, rotors_description/urdf/hummingbird.xacro"
+_ROTORS = "RotorS, urdf/hummingbird.xacro"
 _HUMMINGBIRD = Vehicle(
     name="hummingbird",
     mass=0.716,

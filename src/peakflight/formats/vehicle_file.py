@@ -9,18 +9,18 @@ from peakflight.files import PathLike, parse_json, read_text
 from peakflight.formats import json_course, yaml_course
 from peakflight.vehicle import Vehicle
 
-UNITS = {
-    "mass": "kg",
-    "inertia": "about x, y, z, kg m^2",
-    "rotor_positions": "x forward and y left of each, m, from the centre of mass",
-    "spins": "seen from above: 1 counterclockwise, -1 clockwise",
-    "rotor_thrust": "least and most of one rotor, N",
-    "torque_per_thrust": "of a rotor, m",
-    "motor_lag": "time constant of thrust, s; may be left out",
-    "body_rate": "most across and about the thrust axis, rad/s; may be left out",
-    "drag": "over speed, across and along the thrust axis, kg/s; may be left out",
+FIGURES = {
+    "mass": ("kg", ""),
+    "inertia": ("kg m^2", "about x, y and z"),
+    "rotor_positions": ("m", "x forward and y left of each, from the centre of mass"),
+    "spins": ("", "seen from above: 1 counterclockwise, -1 clockwise"),
+    "rotor_thrust": ("N", "least and most of one rotor"),
+    "torque_per_thrust": ("m", "of a rotor"),
+    "motor_lag": ("s", "time constant of thrust; may be left out"),
+    "body_rate": ("rad/s", "most across and about the thrust axis; may be left out"),
+    "drag": ("kg/s", "force over speed, across and along the thrust axis; may be left out"),
 }
-"""Name of a figure to what it is and its unit."""
+"""Name of a figure to its unit and what there is to say of it."""
 
 
 def read_vehicle(path: PathLike) -> Vehicle:
@@ -54,9 +54,10 @@ def as_yaml(vehicle: Vehicle) -> str:
     """
     values = vehicle.to_dict()
     lines = [f"name: {json.dumps(vehicle.name)}"]
-    for name, unit in UNITS.items():
+    for name, (unit, remark) in FIGURES.items():
         if values[name] is not None:
-            lines.append(f"{name}: {json.dumps(values[name])}  # {unit}")
+            said = ", ".join(part for part in (unit, remark) if part)
+            lines.append(f"{name}: {json.dumps(values[name])}  # {said}")
     mark = ""
     if vehicle.has_default_limits():
         mark = "# "
