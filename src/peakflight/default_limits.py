@@ -13,6 +13,9 @@ from peakflight.limits import GRAVITY, Limits
 MARGIN = 0.15
 """Share of the top thrust that is kept for turning and control: plans that held more than 85 to
 90 % of the top crashed in simulation, those below were flown."""
+STEEP = math.radians(60.0)
+"""Where level flight at the limited thrust leans more than this, tilt is not limited: what crashed
+beyond this angle in simulation was a vehicle that cannot hold its height there."""
 DIGITS = 4
 """Of a limit, but tilt, which is to a tenth of a degree; rounded to the safe side."""
 
@@ -74,7 +77,7 @@ def default_limits(
         # airframe=airframe.
         thrust_acceleration=thrust,
         least_thrust_acceleration=lowest,
-        tilt=math.radians(math.floor(10.0 * math.degrees(tilt)) / 10.0),
+        tilt=None if tilt > STEEP else math.radians(math.floor(10.0 * math.degrees(tilt)) / 10.0),
         angular_acceleration=turning,
         body_rate=_below(rate),
         jerk=_below(min(turned, changed)),
@@ -88,7 +91,7 @@ def default_limits(
         "top above, which turning needs",
         "tilt": "beyond, the limited thrust does not hold the height",
         "angular_acceleration": f"what {kept} of each rotor's top thrust turns at, at any heading",
-        "body_rate": "the rate from which the vehicle can be stopped within its largest tilt"
+        "body_rate": "what can be stopped within the tilt of level flight at the limited thrust"
         if rate == stopping
         else f"{kept} below the vehicle's own limit of {body_rate:.4g} rad/s",
         "jerk": "the limited thrust turned at the limited body rate"
@@ -96,7 +99,7 @@ def default_limits(
         else f"from the least to the largest limited thrust in one motor lag, {motor_lag:.3g} s",
         "snap": "the limited thrust turned at the limited angular acceleration",
     }
-    return limits, reasons
+    return limits, {name: reasons[name] for name in limits.to_dict()}
 
 
 def _below(value: float) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from peakflight.cli.options import whose, written
+from peakflight.cli.options import limits_source, written
 from peakflight.cli.output import Printout, seconds
 from peakflight.limits import LABELS, Limits
 from peakflight.vehicle import Vehicle
@@ -42,7 +42,7 @@ def print_comparisons(
     """
     out = Printout()
     problem = comparisons[0].problem
-    out.path(f"limits{whose(vehicle, given_limits)}: {written(problem.limits)}")
+    out.path(f"limits{limits_source(vehicle, given_limits)}: {written(problem.limits)}")
     for one, said in zip(comparisons, notes, strict=True):
         out.line()
         _print_course(out, one, said)

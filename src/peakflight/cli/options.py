@@ -49,7 +49,7 @@ def written(limits: Limits, separator: str = ",") -> str:
     return separator.join(items)
 
 
-def whose(vehicle: Vehicle | None, given: Limits | None) -> str:
+def limits_source(vehicle: Vehicle | None, given: Limits | None) -> str:
     """Where limits are from, in brackets: the vehicle, the paper, or nothing if all are given."""
     if vehicle is None:
         return "" if given else " (the paper's)"

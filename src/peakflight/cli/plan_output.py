@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from peakflight.cli.options import whose, written
+from peakflight.cli.options import limits_source, written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
 from peakflight.limits import LABELS, Limits
 from peakflight.result import Plan
@@ -44,7 +44,7 @@ def print_plan(
     waypoints = len(plan.problem.waypoints)
     out.line(f"{course}: {waypoints} waypoints, {waypoints - 1} legs", "title")
     _print_notes(out, before)
-    source = whose(plan.vehicle, given_limits)
+    source = limits_source(plan.vehicle, given_limits)
     out.path(f"limits{source}: {written(plan.problem.limits)}")
     out.line()
     method = f"{plan.method}, variant {variant}" if variant else plan.method

@@ -59,7 +59,7 @@ def _print_all() -> None:
             f"{one.mass:g}",
             f"{one.top_thrust_acceleration:.2f}",
             f"{one.limits.thrust_acceleration or 0.0:.2f}",
-            f"{math.degrees(one.limits.tilt or 0.0):.1f}",
+            f"{math.degrees(one.limits.tilt):.1f}" if one.limits.tilt else "none",
             f"{one.motor_lag:g}",
         )
         for one in VEHICLES.values()
