@@ -76,7 +76,7 @@ def plant(t, state, vehicle, yaw):
 @pytest.mark.parametrize("vehicle", [RACER, PLUS, ODD], ids=lambda one: one.name)
 def test_rotor_thrusts_applied_open_loop_fly_the_motion(vehicle, yaw):
     # Nothing holds the attitude: an error in it grows with t^2 and in position with t^4, so that
-    # 1e-11 of the integrator may become 1e-8 within 3 s; wrong physics end metres away.
+    # 1e-12 of the integrator may become 1e-10 within 3 s; wrong physics end metres away.
     seconds = 3.0
     first = states_at(np.zeros(1), vehicle, yaw)
     position, velocity = (one[0] for one in motion_of(np.zeros(1))[:2])
@@ -95,10 +95,10 @@ def test_rotor_thrusts_applied_open_loop_fly_the_motion(vehicle, yaw):
     assert flown.success
     wanted = motion_of(times)
     states = states_at(times, vehicle, yaw)
-    np.testing.assert_allclose(flown.y[:3].T, wanted[0], atol=1e-7)
-    np.testing.assert_allclose(flown.y[3:6].T, wanted[1], atol=1e-7)
-    np.testing.assert_allclose(flown.y[6:10].T, states.attitude, atol=1e-7)
-    np.testing.assert_allclose(flown.y[10:].T, states.body_rate, atol=1e-7)
+    np.testing.assert_allclose(flown.y[:3].T, wanted[0], atol=1e-9)
+    np.testing.assert_allclose(flown.y[3:6].T, wanted[1], atol=1e-9)
+    np.testing.assert_allclose(flown.y[6:10].T, states.attitude, atol=1e-9)
+    np.testing.assert_allclose(flown.y[10:].T, states.body_rate, atol=1e-9)
     leaning = np.degrees(np.arccos(states.rotation[:, 2, 2]))
     assert leaning.max() > 45.0
 
