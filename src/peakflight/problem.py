@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, Limits
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VehicleLike, find_vehicle
 
 DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
 """Names of the derivatives of position, by order."""
@@ -117,7 +119,11 @@ class Problem:
 
     waypoints: np.ndarray
     """(K+1, 3) m, z up; two at least, no two in a row alike."""
-    limits: Limits = field(kw_only=True)
+    limits: Limits = field(default=None, kw_only=True)  # type: ignore[assignment]
+    """What to keep; beside a vehicle only what shall differ from its own, and then the whole."""
+    vehicle: VehicleLike | None = field(default=None, kw_only=True)
+    """What flies: a `Vehicle`, the name of one (`peakflight.VEHICLES`) or the path of its file;
+    then the `Vehicle`, with the limits of this problem."""
     minimize: str | Mapping[str | int, float] | Sequence[float] = field(
         default="jerk", kw_only=True
     )
@@ -139,8 +145,18 @@ class Problem:
         waypoints = _waypoints(self.waypoints)
         legs, axes = len(waypoints) - 1, waypoints.shape[1]
         object.__setattr__(self, "waypoints", waypoints)
-        if not isinstance(self.limits, Limits):
+        if self.limits is None and self.vehicle is None:
+            raise InvalidProblem(
+                "limits is missing; give limits=peakflight.Limits(speed=..., ...) or vehicle=..."
+            )
+        if not isinstance(self.limits, Limits | None):
             raise InvalidProblem(f"limits is {self.limits!r}; it must be a peakflight.Limits")
+        if self.vehicle is not None:
+            vehicle = find_vehicle(self.vehicle)
+            if self.limits is not None:
+                vehicle = vehicle.with_limits(self.limits)
+            object.__setattr__(self, "vehicle", vehicle)
+            object.__setattr__(self, "limits", vehicle.limits)
         if all(getattr(self.limits, name) is None for name in BOUNDING):
             raise InvalidProblem(
                 f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
@@ -207,6 +223,7 @@ class Problem:
         return {
             "waypoints": self.waypoints.tolist(),
             "limits": self.limits.to_dict(),
+            "vehicle": _vehicle_to_dict(self.vehicle),
             "minimize": minimize,
             "degree": self.degree,
             "continuity": self.continuity,
@@ -223,6 +240,9 @@ class Problem:
         for name in ("waypoints", "limits"):
             if name not in values:
                 raise InvalidProblem(f"{name} is missing")
+        if values.get("vehicle") is not None:
+            figures = dict(values["vehicle"])
+            values["vehicle"] = Vehicle.from_dict({**figures, "limits": values["limits"]})
         values["limits"] = Limits.from_dict(values["limits"])
         inner = values.get("derivatives") or {}
         values["derivatives"] = {int(index): state for index, state in inner.items()}
@@ -349,6 +369,14 @@ def _number(value: Any) -> Any:
 
 def _numbers(state: Any) -> list[list[float | None]]:
     return [[None if math.isnan(x) else x for x in row] for row in state.tolist()]
+
+
+def _vehicle_to_dict(vehicle: VehicleLike | None) -> dict[str, Any] | None:
+    """A vehicle without its limits, which stand beside it, and the reasons for them."""
+    if not isinstance(vehicle, Vehicle):
+        return None
+    beside = ("limits", "reasons")
+    return {name: value for name, value in vehicle.to_dict().items() if name not in beside}
 
 
 def _weights(minimize: str | Mapping[str | int, float] | Sequence[float]) -> dict[int, float]:

@@ -9,6 +9,8 @@ import click
 
 from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, LimitKind, Limits
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VEHICLES, find_vehicle
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -59,6 +61,25 @@ def written(limits: Limits, separator: str = ",") -> str:
         number = f"{math.degrees(value):.10g}deg" if kind.unit == "rad" else f"{value:.10g}"
         items.append(f"{kind.name}={number}")
     return separator.join(items)
+
+
+def limits_source(vehicle: Vehicle | None, given: Limits | None) -> str:
+    """Where limits are from, in brackets: the vehicle, the paper, or nothing if all are given."""
+    if vehicle is None:
+        return "" if given else " (the paper's)"
+    but = f" but {', '.join(given.to_dict())}" if given else ""
+    return f" (of {vehicle.name}{but})"
+
+
+def vehicle_option(command: _Command) -> _Command:
+    """Option `--vehicle` of a command, a `Vehicle`; None if not given."""
+    return click.option(
+        "--vehicle",
+        metavar="NAME|FILE.yaml",
+        callback=vehicle_of,
+        help=f"What flies: {', '.join(VEHICLES)}, or a file of your own; see peakflight vehicles. "
+        "Its limits are kept, but for those that --limits names.",
+    )(command)
 
 
 def limits_option(help: str, default: Limits | None = None) -> Callable[[_Command], _Command]:
@@ -121,6 +142,16 @@ def _limits(
         return None
     try:
         return parse_limits(",".join(texts))
+    except InvalidProblem as error:
+        raise click.BadParameter(str(error), context, parameter) from None
+
+
+def vehicle_of(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> Vehicle | None:
+    """Find the vehicle that an option or argument names."""
+    try:
+        return None if text is None else find_vehicle(text)
     except InvalidProblem as error:
         raise click.BadParameter(str(error), context, parameter) from None
 

@@ -8,7 +8,13 @@ import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import FolderPath, common_options, limits_option, spline_options
+from peakflight.cli.options import (
+    FolderPath,
+    common_options,
+    limits_option,
+    spline_options,
+    vehicle_option,
+)
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
@@ -18,12 +24,14 @@ from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.result import Plan
+from peakflight.vehicle import Vehicle
 
 PLAN_FILE = "plan.json"
 PICTURES = {
     "course": "the path, coloured by speed",
     "derivatives": "what is limited, against time",
     "segment_times": "times of the legs, by iteration",
+    "rotors": "rotor thrusts and body rates, against time",
 }
 """Name without .png, and what it shows."""
 VARIANTS = ("descent", "paper")
@@ -86,6 +94,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
+@vehicle_option
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
@@ -114,6 +123,7 @@ def plan(
     max_pieces: int | None,
     effort: float | None,
     time_limit: float | None,
+    vehicle: Vehicle | None,
     limits: Limits | None,
     minimize: str,
     degree: int | None,
@@ -132,6 +142,7 @@ def plan(
     \b
     Example:
       peakflight plan course.csv --limits speed=5,jerk=62,tilt=50deg -o race
+      peakflight plan course.csv --vehicle crazyflie-2.1-upgrade --limits speed=3
     """  # noqa: D301
     tuning = {
         "time_penalty": time_penalty,
@@ -148,7 +159,8 @@ def plan(
         read, notes = read_tidied(course, strict=strict)
         problem = Problem(
             read.waypoints,
-            limits=limits or PAPER_LIMITS,
+            vehicle=vehicle,
+            limits=limits if vehicle else limits or PAPER_LIMITS,  # type: ignore[arg-type]
             minimize=minimize,
             degree=degree,
             continuity=continuity,
@@ -182,7 +194,7 @@ def plan(
             answer,
             course=read.name,
             variant=variant,
-            default_limits=limits is None,
+            given_limits=limits,
             before=notes,
             after=more,
             folder=folder.path,

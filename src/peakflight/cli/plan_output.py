@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from peakflight.cli.options import written
+from peakflight.cli.options import limits_source, written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
-from peakflight.limits import LABELS
+from peakflight.limits import LABELS, Limits
 from peakflight.result import Plan
 
 MOST_LEGS = 40
@@ -22,7 +22,7 @@ def print_plan(
     *,
     course: str,
     variant: str | None,
-    default_limits: bool,
+    given_limits: Limits | None,
     before: Sequence[str],
     after: Sequence[str],
     folder: Path,
@@ -33,6 +33,8 @@ def print_plan(
 
     Parameters
     ----------
+    given_limits
+        What the user has limited; None for the defaults of the vehicle, or the paper's.
     before, after
         Notes about the course and about the files.
     files, summaries
@@ -42,7 +44,7 @@ def print_plan(
     waypoints = len(plan.problem.waypoints)
     out.line(f"{course}: {waypoints} waypoints, {waypoints - 1} legs", "title")
     _print_notes(out, before)
-    source = " (the paper's)" if default_limits else ""
+    source = limits_source(plan.vehicle, given_limits)
     out.path(f"limits{source}: {written(plan.problem.limits)}")
     out.line()
     method = f"{plan.method}, variant {variant}" if variant else plan.method

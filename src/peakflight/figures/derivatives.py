@@ -1,7 +1,6 @@
 """What is limited, against time, with the limits."""
 
 import textwrap
-from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -60,10 +59,10 @@ def derivatives_figure(plan: Plan) -> Figure:
     trajectory, limits = plan.trajectory, plan.problem.limits
     times, curves = sampled_curves(trajectory)
     kinds = shown_kinds(limits, curves)
-    figure = new_figure(panels_height(kinds) + TOP)
+    figure = new_figure(panels_height(len(kinds)) + TOP)
     write_headline(figure, plan, 0.12)
     write_note(figure, KEY, WIDTH - 0.12)
-    panels = add_panels(figure, kinds)
+    panels = add_panels(figure, len(kinds))
     for kind, axes in zip(kinds, panels, strict=True):
         values = curves[kind.name]
         axes.plot(times.ravel(), values.ravel(), color=INK, linewidth=1.0, zorder=3)
@@ -72,8 +71,8 @@ def derivatives_figure(plan: Plan) -> Figure:
         if limit is not None:
             kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
             _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
-        _draw_borders(axes, plan.waypoint_times)
-    _number_legs(panels[0], plan.waypoint_times)
+        draw_borders(axes, plan.waypoint_times)
+    number_legs(panels[0], plan.waypoint_times)
     return figure
 
 
@@ -105,15 +104,15 @@ def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind
     ]
 
 
-def panels_height(kinds: Sequence[LimitKind]) -> float:
-    """Height of a figure of panels without what stands above them, in."""
-    return BOTTOM + len(kinds) * PANEL + (len(kinds) - 1) * GAP
+def panels_height(count: int) -> float:
+    """Height of a figure of panels under one another, without what stands above them, in."""
+    return BOTTOM + count * PANEL + (count - 1) * GAP
 
 
-def add_panels(figure: Figure, kinds: Sequence[LimitKind]) -> list[Axes]:
-    """Put a panel for each kind under one another, with one axis of time; the first is on top."""
+def add_panels(figure: Figure, count: int) -> list[Axes]:
+    """Put panels under one another, with one axis of time; the first is on top."""
     panels = []
-    for row in range(len(kinds)):
+    for row in range(count):
         bottom = BOTTOM + row * (PANEL + GAP)
         axes = add_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
         axes.tick_params(labelbottom=row == 0)
@@ -190,7 +189,8 @@ def _mark_peaks(
         )
 
 
-def _draw_borders(axes: Axes, borders: np.ndarray) -> None:
+def draw_borders(axes: Axes, borders: np.ndarray) -> None:
+    """Draw a line at each border of a leg, as many as can be told apart; borders in s."""
     inner = borders[1:-1]
     inner = inner[:: even_step(len(inner), MOST_BORDERS)]
     lines = [[(time, 0.0), (time, 1.0)] for time in inner]
@@ -206,7 +206,7 @@ def _draw_borders(axes: Axes, borders: np.ndarray) -> None:
     )
 
 
-def _number_legs(axes: Axes, borders: np.ndarray) -> None:
+def number_legs(axes: Axes, borders: np.ndarray) -> None:
     """Write the number of each leg above its middle, as far as there is room."""
     legs = len(borders) - 1
     points = POINTS * (WIDTH - LEFT - RIGHT) / (borders[-1] - borders[0])

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from peakflight.errors import InvalidFile
 from peakflight.figures.course import course_figure
 from peakflight.figures.derivatives import derivatives_figure
+from peakflight.figures.rotors import rotors_figure
 from peakflight.figures.segment_times import segment_times_figure
 from peakflight.files import PathLike, prepare_folder, write_atomically
 from peakflight.result import Plan
@@ -20,6 +21,8 @@ FIGURES = {
     "segment_times": segment_times_figure,
 }
 """Name of file to what draws it."""
+VEHICLE_FIGURES = {"rotors": rotors_figure}
+"""As `FIGURES`, for plans that have a vehicle."""
 
 
 def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[Path]:
@@ -30,7 +33,8 @@ def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[P
     plan
         What to draw, feasible or not.
     folder
-        Gets `course`, `derivatives` and `segment_times`; nothing is left half written.
+        Gets `course`, `derivatives`, `segment_times` and, if the plan has a vehicle, `rotors`;
+        nothing is left half written.
     format
         "png", "pdf" or "svg".
 
@@ -47,7 +51,8 @@ def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[P
         raise InvalidFile(f"{folder}: format {format!r} is unknown; known are {', '.join(FORMATS)}")
     target = prepare_folder(folder)
     paths = []
-    for name, draw in FIGURES.items():
+    wanted = FIGURES if plan.vehicle is None else FIGURES | VEHICLE_FIGURES
+    for name, draw in wanted.items():
         paths.append(target / f"{name}.{format}")
         write_figure(draw(plan), paths[-1])
     return paths
