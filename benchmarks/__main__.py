@@ -14,7 +14,10 @@ from benchmarks.machine import describe, load
 from benchmarks.report import Table, as_markdown, missed, write_json
 from benchmarks.scope import Scope
 
-SUITES = ("startup", "flight_time", "methods", "random_joint", "speed", "peers", "memory")
+SUITES = (
+    "startup", "flight_time", "methods", "random_joint", "unseen_bound", "comparison", "speed",
+    "peers", "memory",
+)  # fmt: skip
 """Modules of this folder, imported when they run: a quick run chooses the cache of kernels first,
 and what the first plan of all compiles is there for the rest."""
 OUTPUT = Path("out/bench.json")

@@ -1,4 +1,4 @@
-"""What is planned: the courses of `examples/`, seeded random ones, and the limits."""
+"""What is planned: the courses of `examples/`, seeded random ones, and the paper's limits."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import peakflight as pf
+from peakflight import paper
 
 FOLDER = Path(__file__).parent.parent / "examples" / "courses"
 SEED = 20240229
@@ -31,7 +32,7 @@ JERK = Task(
     "min jerk",
     "jerk",
     5,
-    pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0),
+    paper.PRINTED[0].limits,
     {
         "tight_then_fast": 4.7148,
         "mfbo_traj_2": 4.6369,
@@ -45,7 +46,7 @@ SNAP = Task(
     "min snap",
     "snap",
     7,
-    pf.Limits(speed=5.0, thrust_acceleration=14.5, jerk=54.0, snap=800.0),
+    paper.PRINTED[1].limits,
     {
         "tight_then_fast": 5.1162,
         "mfbo_traj_2": 4.8904,
@@ -77,9 +78,9 @@ def unseen(index: int) -> np.ndarray:
     return np.vstack((np.zeros(3), np.cumsum(lengths * directions, axis=0)))
 
 
-def walk(legs: int) -> np.ndarray:
-    """(K+1, 3) m: a random walk with normal steps of 1.5, 1.5 and 0.5 m."""
-    rng = np.random.default_rng([SEED, legs])
+def walk(legs: int, *index: int) -> np.ndarray:
+    """(K+1, 3) m: a random walk with normal steps of 1.5, 1.5 and 0.5 m; one for each index."""
+    rng = np.random.default_rng([SEED, legs, *index])
     steps = rng.normal(size=(legs, 3)) * (1.5, 1.5, 0.5)
     return np.vstack((np.zeros(3), np.cumsum(steps, axis=0)))
 

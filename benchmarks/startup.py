@@ -9,6 +9,7 @@ from pathlib import Path
 from benchmarks.processes import ROOT, ProcessFailed, median, python
 from benchmarks.report import Cell, Column, Row, Table, failure, judged
 from benchmarks.scope import Scope
+from peakflight.limits import PAPER_LIMITS
 
 IMPORT_BAR = 0.3
 FIRST_BAR = 20.0
@@ -30,12 +31,12 @@ print(json.dumps([name for name in heavy if name in sys.modules]))
 FIRST_PLAN = """
 import peakflight as pf
 course = pf.read_course({course!r})
-limits = pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+limits = pf.Limits(**{limits!r})
 plan = pf.plan(course.waypoints, limits=limits)
 assert plan.feasible, plan.message
 """
 COURSE = str(ROOT / "examples" / "courses" / "random_10.json")
-LIMITS = "speed=5,thrust_acceleration=15.5,jerk=62,snap=800"
+LIMITS = ",".join(f"{name}={value:g}" for name, value in PAPER_LIMITS.to_dict().items())
 
 
 def run(scope: Scope) -> list[Table]:
@@ -91,7 +92,7 @@ def _imports(count: int) -> list[Row]:
 
 def _first_plan(scope: Scope) -> list[Row]:
     rows = []
-    code = FIRST_PLAN.format(course=COURSE)
+    code = FIRST_PLAN.format(course=COURSE, limits=PAPER_LIMITS.to_dict())
     what: dict[str, Cell] = {
         "what": "first plan ever (random_10, nothing compiled)",
         "processes": 1,

@@ -58,6 +58,18 @@ def kernel_bounds(coefficients, times, limits):
     return upper, lower, place
 
 
+def test_a_kind_whose_workspace_is_left_out_has_no_bound():
+    coefficients, times = np.zeros((1, 4, 3)), np.ones(1)
+    limits = np.array([5.0, np.nan, np.nan, np.nan, 1.5, 1.0, 3.0, 3.0])
+    upper, lower, place = (np.empty((1, len(KINDS))) for _ in range(3))
+    bounds.certify(
+        coefficients, times, limits, GRAVITY, bounds.lookup_tables(3), TOLERANCE, upper, lower,
+        place, None, None, 1,
+    )  # fmt: skip
+    assert upper[0, 0] <= 1e-9
+    assert (upper[0, 4:] > 1.0).all(), "hovering keeps them all, but nothing has looked"
+
+
 # ---- nasty pieces ---------------------------------------------------------------------------
 
 

@@ -165,7 +165,7 @@ class TestPlan:
         self, hand_plan: Callable[..., pf.Plan], capsys: pytest.CaptureFixture[str]
     ) -> None:
         plan = hand_plan(pieces=(1, 3, 2))
-        options = {"variant": None, "default_limits": False, "before": (), "after": ()}
+        options = {"variant": None, "given_limits": PAPER_LIMITS, "before": (), "after": ()}
         print_plan(plan, course="x", folder=Path("d"), files={}, summaries={}, **options)
         printed = capsys.readouterr().out
         for leg, duration in enumerate(np.diff(plan.waypoint_times)):
@@ -454,6 +454,108 @@ def test_bad_limits(run: Run, folder: Path, text: str, words: str) -> None:
     assert names(folder) == {"lap.csv"}
 
 
+class TestVehicles:
+    def test_plan_keeps_the_limits_of_the_vehicle_but_those_given(
+        self, run: Run, folder: Path
+    ) -> None:
+        options = ("--vehicle", "crazyflie-2.1", "--limits", "speed=2,jerk=40")
+        result = run("plan", "lap.csv", "--method", "proportional", "-o", "out", *options)
+        assert result.exit_code == 0
+        assert names(folder / "out") == DATA | PICTURES | {"rotors.png"}
+        plan = pf.Plan.load(folder / "out" / "plan.json")
+        stock = pf.VEHICLES["crazyflie-2.1"]
+        assert plan.problem.limits == replace(stock.limits, speed=2.0, jerk=40.0)
+        assert plan.vehicle is not None
+        assert plan.vehicle.rotor_thrust == stock.rotor_thrust
+        assert "limits (of crazyflie-2.1 but speed, jerk): speed=2,thrust_" in result.stdout
+        assert "rotor thrusts and body rates, against time" in result.stdout
+        checked = run("check", "out/plan.json")
+        assert checked.exit_code == 0
+        assert "for crazyflie-2.1" in checked.stdout
+        assert json.loads(run("check", "out/plan.json", "--json").stdout)["vehicle"] == stock.name
+
+    def test_check_takes_other_limits_whole(self, run: Run, folder: Path) -> None:
+        run("plan", "lap.csv", "--vehicle", "racing-quad", "-o", "out", *QUICK)
+        result = run("check", "out/plan.json", "--limits", "speed=90", "--json")
+        assert json.loads(result.stdout)["limits"] == {"speed": 90.0}
+
+    def test_a_file_of_ones_own(self, run: Run, folder: Path) -> None:
+        printed = run("vehicles", "racing-quad", "--yaml")
+        assert printed.exit_code == 0
+        (folder / "mine.yaml").write_text(printed.stdout.replace("0.85", "0.95"))
+        result = run("plan", "lap.csv", "--vehicle", "mine.yaml", *QUICK, "--json")
+        assert result.exit_code == 0
+        planned = json.loads(result.stdout)
+        assert planned["problem"]["vehicle"]["mass"] == 0.95
+        assert planned["limits"]["thrust_acceleration"] == pytest.approx(27.51 * 0.85 / 0.95, 1e-3)
+
+    def test_compare_keeps_the_limits_of_the_vehicle(self, run: Run) -> None:
+        options = ("--vehicle", "racing-quad", "--methods", "proportional")
+        result = run("compare", "lap.csv", *options)
+        assert result.exit_code == 0
+        assert "limits (of racing-quad): thrust_acceleration=27.51" in result.stdout
+        values = json.loads(run("compare", "lap.csv", *options, "--json").stdout)
+        assert values["vehicle"]["name"] == "racing-quad"
+
+    @pytest.mark.parametrize("command", ["plan lap.csv --vehicle", "vehicles"])
+    def test_bad_names_list_the_known_ones(self, run: Run, command: str) -> None:
+        refused(run(*command.split(), "kite"), "unknown vehicle 'kite'", *pf.VEHICLES, "YAML file")
+
+    @pytest.mark.parametrize(
+        ("content", "words"),
+        [
+            (None, "mine.yaml: no such file"),
+            ("mass: [", "mine.yaml: line 2 is not YAML"),
+            ("mass: 1", "mine.yaml: vehicle inertia is missing"),
+            ("weight: 1", "mine.yaml: vehicle has an unknown key 'weight'; known are name, mass"),
+        ],
+    )
+    def test_bad_files_are_named(
+        self, run: Run, folder: Path, content: str | None, words: str
+    ) -> None:
+        if content is not None:
+            (folder / "mine.yaml").write_text(content)
+        refused(run("plan", "lap.csv", "--vehicle", "mine.yaml"), words)
+
+    def test_a_vehicle_that_cannot_hover_is_refused(self, run: Run, folder: Path) -> None:
+        text = run("vehicles", "racing-quad", "--yaml").stdout.replace("0.85", "4")
+        (folder / "mine.yaml").write_text(text)
+        refused(run("vehicles", "mine.yaml"), "mine.yaml: vehicle rotor_thrust", "cannot hover")
+
+    def test_the_list_and_one_of_it(self, run: Run) -> None:
+        listed = run("vehicles")
+        assert listed.exit_code == 0
+        assert all(name in listed.stdout for name in pf.VEHICLES)
+        one = run("vehicles", "racing-quad")
+        assert one.exit_code == 0
+        for words in ("0.85 kg", "uzh-rpg/rpg_time_optimal", "15% below the vehicle's own limit"):
+            assert words in " ".join(one.stdout.split())
+        unknown = run("vehicles", "hummingbird").stdout
+        assert "unknown" in unknown
+        for text in (listed.stdout, *(one.stdout, unknown)):
+            lines = [line for line in text.splitlines() if "--limits" not in line]
+            assert max(map(len, lines)) <= 80
+
+    def test_json(self, run: Run) -> None:
+        listed = json.loads(run("vehicles", "--json").stdout)["vehicles"]
+        assert [one["name"] for one in listed] == list(pf.VEHICLES)
+        (one,) = json.loads(run("vehicles", "hummingbird", "--json").stdout)["vehicles"]
+        assert one.pop("top_thrust_acceleration") == pytest.approx(33.54, abs=0.01)
+        assert pf.Vehicle.from_dict(one) == pf.VEHICLES["hummingbird"]
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            (("--yaml",), "--yaml needs the name of a vehicle"),
+            (("hummingbird", "--yaml", "--json"), "--yaml and --json exclude each other"),
+        ],
+    )
+    def test_bad_options(self, run: Run, options: tuple[str, ...], words: str) -> None:
+        result = run("vehicles", *options)
+        assert result.exit_code == 2
+        assert words in result.stderr
+
+
 def test_limits_given_twice_in_two_options(run: Run) -> None:
     refused(run("plan", "lap.csv", "--limits", "speed=5", "--limits", "speed=4"), "given twice")
 
@@ -518,6 +620,7 @@ class TestOutputFolder:
 
     def test_name_too_long(self, run: Run, folder: Path) -> None:
         refused(run("plan", "lap.csv", "-o", f"new/{'a' * 300}"), "cannot be written to")
+        refused(run("plan", "lap.csv", "-o", ""), "the name is empty")
         assert names(folder) == {"lap.csv"}
 
     def test_a_folder_where_a_file_should_go(self, run: Run, folder: Path) -> None:

@@ -17,8 +17,10 @@ from scipy.interpolate import make_interp_spline
 
 from peakflight import (
     GRAVITY,
+    VEHICLES,
     History,
     InvalidFile,
+    InvalidProblem,
     Limits,
     MissingExtra,
     Plan,
@@ -26,10 +28,12 @@ from peakflight import (
     Report,
     Status,
     Trajectory,
+    planned_states,
 )
 from peakflight.figures import (
     course_figure,
     derivatives_figure,
+    rotors_figure,
     save_figures,
     segment_times_figure,
 )
@@ -621,6 +625,44 @@ def test_save_writes_three_pictures_and_nothing_else(tmp_path):
         assert sorted(path.name for path in folder.iterdir()) == names
         for path in written:
             assert path.read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
+
+
+@pytest.mark.kernels
+def test_a_plan_with_a_vehicle_has_a_picture_of_its_rotors(tmp_path):
+    vehicle = VEHICLES["crazyflie-2.1"]
+    plan = make_plan(TWISTY, problem=Problem(TWISTY, vehicle=vehicle))
+    written = save_figures(plan, tmp_path)
+    assert [path.name for path in written][-1] == "rotors.png"
+    panels = rotors_figure(plan).axes[::-1]  # made from below
+    thrusts = [line for line in panels[0].lines if len(line.get_xdata()) > 2]
+    times = thrusts[0].get_xdata()
+    states = planned_states(plan, times)
+    for rotor, line in enumerate(thrusts):
+        np.testing.assert_array_equal(line.get_ydata(), states.rotor_thrust[:, rotor])
+    dashed = [line.get_ydata()[0] for line in panels[0].lines if len(line.get_xdata()) == 2]
+    np.testing.assert_allclose(dashed, vehicle.rotor_thrust[::-1], rtol=1e-3)
+    names = [text.get_text() for text in panels[0].get_legend().get_texts()]
+    assert names == ["rotor 1", "rotor 2", "rotor 3", "rotor 4"]
+    for panel, rate in zip(panels[1:], vehicle.body_rate, strict=True):
+        assert any(text.get_text().startswith(f"{rate:.4g} rad/s") for text in panel.texts)
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("vehicle", ["racing-quad", "hummingbird"])
+def test_rotors_out_of_range_and_unknown_rates_can_be_drawn(vehicle):
+    plan = make_plan(TWISTY, pace=8.0, problem=Problem(TWISTY, vehicle=vehicle))
+    panels = rotors_figure(plan).axes[::-1]  # made from below
+    thrusts = [line.get_ydata() for line in panels[0].lines]
+    lowest, highest = panels[0].get_ylim()
+    assert lowest <= min(values.min() for values in map(np.asarray, thrusts))
+    assert highest > max(values.max() for values in map(np.asarray, thrusts))
+    rates_are_drawn = any(len(line.get_xdata()) == 2 for line in panels[1].lines)
+    assert rates_are_drawn == (vehicle == "racing-quad")
+
+
+def test_rotors_of_a_plan_without_a_vehicle_are_refused():
+    with pytest.raises(InvalidProblem, match="the plan has no vehicle"):
+        rotors_figure(make_plan(TWISTY))
 
 
 @pytest.mark.parametrize(("kind", "start"), [("pdf", b"%PDF-"), ("svg", b"<?xml")])

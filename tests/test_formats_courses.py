@@ -422,7 +422,7 @@ def test_broken_json(text, message, refusal):
         ("waypoints: &a\n  position: *a\n", "line 2: *a names nothing that is complete by here"),
         (
             "- [0, 0, 1]\n- [1, 0, 1]\n---\n- [2, 0, 1]\n",
-            "line 3: a second document begins; a course",
+            "line 3: a second document begins; a file holds one",
         ),
         ("name: nothing else\n", "holds no waypoints; name them under the key waypoints"),
         ("--- text\n", "holds 'text'; a course is a list or a mapping of points"),

@@ -9,7 +9,7 @@ import pytest
 import peakflight as pf
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.formats import FLIGHT_WRITERS, read_course, write_crazyflie, write_samples
-from peakflight.formats.heading import heading
+from peakflight.heading import heading
 
 POSITION_ERROR = 3e-8
 """m, and m/s; what nine significant digits cost (ecosystem notes)."""
@@ -104,6 +104,35 @@ def test_samples_have_named_columns_with_units(hand_plan, tmp_path):
     assert columns[13:] == ["sx [m/s^4]", "sy [m/s^4]", "sz [m/s^4]"]
     write_samples(hand_plan(yaw=[0, 1, 2, 3]), tmp_path / "s.csv")
     assert list(read_samples(tmp_path / "s.csv"))[16:] == ["yaw [rad]"]
+
+
+@pytest.mark.kernels
+def test_samples_of_a_vehicle_have_its_attitude_rates_and_rotor_thrusts(hand_plan, tmp_path):
+    plan = hand_plan(yaw=[0.0, 1.0, 2.0, 1.0])
+    write_samples(plan, tmp_path / "without.csv")
+    plan = replace(plan, problem=replace(plan.problem, vehicle="racing-quad"))
+    assert write_samples(plan, tmp_path / "with.csv") == ()
+    without, samples = (read_samples(tmp_path / f"{name}.csv") for name in ("without", "with"))
+    new = ["qw [1]", "qx [1]", "qy [1]", "qz [1]", "wx [rad/s]", "wy [rad/s]", "wz [rad/s]"]
+    new += [f"f{rotor} [N]" for rotor in (1, 2, 3, 4)]
+    assert list(samples) == [*without, *new]
+    for name, values in without.items():
+        np.testing.assert_array_equal(samples[name], values)
+    states = pf.planned_states(plan, np.minimum(samples["t [s]"], plan.trajectory.end_time))
+    wanted = np.hstack((states.attitude, states.body_rate, states.rotor_thrust))
+    np.testing.assert_allclose([samples[name] for name in new], wanted.T, rtol=1e-7, atol=1e-7)
+    course = read_course(tmp_path / "with.csv")
+    np.testing.assert_array_equal(course.waypoints[:, 0], samples["x [m]"])
+
+
+@pytest.mark.kernels
+def test_samples_say_where_rotors_are_asked_for_too_much(hand_plan, tmp_path):
+    plan = hand_plan(yaw=[0.0, 3.0, -3.0, 0.0])
+    plan = replace(plan, problem=replace(plan.problem, vehicle="crazyflie-2.1"))
+    plan = replace(plan, trajectory=plan.trajectory.stretch(0.3))
+    (note,) = write_samples(plan, tmp_path / "samples.csv")
+    assert note.startswith("flown exactly, at this yaw, it takes -")
+    assert note.endswith("N of a rotor; crazyflie-2.1 has 0.0128 to 0.12 N")
 
 
 def test_samples_are_the_trajectory(hand_plan, tmp_path):

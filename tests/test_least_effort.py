@@ -1,6 +1,7 @@
 """Mellinger's and Bry's methods, and the descent on the spline's optimal cost that they share."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +19,12 @@ from peakflight import (
     stretch_to_limits,
 )
 from peakflight.kernels import basis
-from peakflight.methods import bry, mellinger
+from peakflight.methods import METHODS, bry, mellinger
 from peakflight.methods.least_effort import DescentSettings, descend
 from peakflight.spline import SplineTask
 
-COURSES = sorted((Path(__file__).parent.parent / "examples" / "courses").glob("*.json"))
+FOLDER = Path(__file__).parent.parent / "examples" / "courses"
+COURSES = {path.stem: path for path in sorted(FOLDER.iterdir()) if path.suffix != ".md"}
 JERK = {"limits": Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)}
 SNAP = {
     "limits": Limits(speed=5.0, thrust_acceleration=14.5, jerk=54.0, snap=800.0),
@@ -50,8 +52,11 @@ FURTHER = {
     "free end": {**JERK, "end": {1: [math.nan] * 3, 2: [math.nan] * 3}},
 }
 
+SHORT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
+"""m."""
+
 every_case = pytest.mark.parametrize("case", CASES)
-every_course = pytest.mark.parametrize("path", COURSES, ids=lambda path: path.stem)
+every_course = pytest.mark.parametrize("path", COURSES.values(), ids=COURSES)
 
 
 def random_course(legs, seed):
@@ -245,6 +250,57 @@ def test_the_penalty_is_raised_until_a_limit_is_reached(case, closeness):
     assert made.report.worst >= 1.0 - 1e-8
 
 
+def test_where_every_optimum_exceeds_the_limits_that_is_said():
+    """Position in the cost holds the total back: no c_t from 0 on is slow enough."""
+    problem = Problem(SHORT, **{**JERK, "minimize": {0: 1.0, 3: 1e-3}})
+    made = plan(problem, method="bry")
+    assert made.status is Status.NO_PROGRESS
+    assert made.feasible
+    said = re.fullmatch(
+        r"even without a penalty on time the optimum exceeds the limits; "
+        r"it was slowed down by ([\d.]+) %",
+        made.message,
+    )
+    last = made.history.segment_times[-1]
+    slower = 100.0 * (made.duration / last.sum() - 1.0)
+    assert float(said[1]) == pytest.approx(slower, rel=5e-3)  # three digits
+    least = plan(problem, method="bry", time_penalty=1e-6)
+    assert least.duration == pytest.approx(made.duration, rel=1e-2)  # where the search gives up
+    assert made.iterations < 200  # 40 rounds took 275
+
+
+def test_where_the_optimum_jumps_across_the_limits_that_is_said():
+    fast = {"velocity": [2.0, 0.0, 0.0]}
+    made = plan(SHORT[:2], method="bry", **JERK, start=fast, end=fast)
+    assert made.status is Status.NO_PROGRESS
+    assert made.feasible
+    assert made.message == (
+        "at time_penalty 7.97381 the optimum jumps across the limits; the one within was "
+        "shortened by 82 %, and is the optimum of no time_penalty"
+    )
+    assert made.duration == pytest.approx(0.967, abs=5e-4)  # as the docs say
+    assert made.history.segment_times[-1].sum() == pytest.approx(5.37, abs=5e-3)
+
+
+def test_where_no_penalty_was_found_in_time_that_is_said(monkeypatch):
+    monkeypatch.setattr(bry, "ROUNDS", 1)
+    made = plan(random_course(6, 4), method="bry", **MOVING, **JERK)
+    assert made.status is Status.ITERATION_LIMIT
+    assert made.feasible
+    assert made.message.startswith("no time_penalty was found at which the optimum reaches")
+
+
+@pytest.mark.parametrize("minimize", ["jerk", {2: 1.0, 3: 1e-3}])
+@pytest.mark.parametrize(
+    ("penalty", "side"),
+    [(1e-100, "above"), (1e-20, "above"), (1e20, "below"), (1e50, "below"), (1e100, "below")],
+)
+def test_a_penalty_for_an_absurd_total_is_refused(minimize, penalty, side):
+    text = rf"^setting time_penalty is {re.escape(f'{penalty:g}')}; it asks for a total time {side}"
+    with pytest.raises(InvalidProblem, match=text):
+        plan(SHORT, method="bry", **{**JERK, "minimize": minimize}, time_penalty=penalty)
+
+
 @pytest.mark.parametrize("name", CLASSES)
 @every_course
 def test_bry_is_mellinger_where_slowing_down_keeps_the_path(name, path):
@@ -255,7 +311,7 @@ def test_bry_is_mellinger_where_slowing_down_keeps_the_path(name, path):
 
 
 def test_bry_is_not_mellinger_where_it_does_not():
-    waypoints = read_course(COURSES[0].parent / "tight_then_fast.json").waypoints
+    waypoints = read_course(COURSES["tight_then_fast"]).waypoints
     for options in (MIXED, {**JERK, **MOVING}):
         one, other = (plan(waypoints, method=m, **options) for m in ("mellinger", "bry"))
         assert abs(one.duration / other.duration - 1.0) > 1e-3
@@ -286,6 +342,17 @@ def test_peak_is_no_slower(name, path):
         assert best <= plan(waypoints, method=method, **CLASSES[name]).duration * (1.0 + 5e-4)
 
 
+@every_course
+@pytest.mark.parametrize("options", [JERK, SNAP], ids=["jerk", "snap"])
+def test_joint_is_the_fastest(options, path):
+    """Of every method, by its defaults, on every public course and at the paper's limits."""
+    waypoints = read_course(path).waypoints
+    rows = {method: plan(waypoints, method=method, **options) for method in METHODS}
+    assert all(made.feasible for made in rows.values())
+    best = rows.pop("joint").duration
+    assert all(best < made.duration for made in rows.values())
+
+
 @both
 @pytest.mark.parametrize("options", [JERK, SNAP], ids=["jerk", "snap"])
 def test_a_thousand_legs(method, options):
@@ -311,10 +378,39 @@ def test_the_history_is_as_long_as_is_asked(method):
     made = plan(waypoints, method=method, **JERK)
     short = plan(waypoints, method=method, **JERK, history_size=59)
     assert short.history.segment_times.shape == (5, 10)
-    np.testing.assert_array_equal(short.history.segment_times, made.history.segment_times[:5])
     np.testing.assert_array_equal(short.segment_times, made.segment_times)
+    if method == "mellinger":
+        np.testing.assert_array_equal(short.history.segment_times, made.history.segment_times[:5])
     least = plan(waypoints, method=method, **JERK, history_size=1)
     assert least.history.segment_times.shape == (1, 10)
+
+
+def test_the_history_of_bry_is_in_the_order_run_and_ends_at_the_plan(monkeypatch):
+    problem = Problem(random_course(6, 4), **MIXED)
+    trials = []
+    descend = bry.descend
+
+    def watched(*arguments, **options):
+        found = descend(*arguments, **options)
+        if options.get("iterations") is None:
+            trials.append(found)
+        return found
+
+    monkeypatch.setattr(bry, "descend", watched)
+    made = plan(problem, method="bry")
+    assert len(trials) > 2
+    run = np.concatenate([found.road for found in trials])
+    np.testing.assert_array_equal(made.history.segment_times, run)
+    np.testing.assert_array_equal(run[-1], trials[-1].times)
+    rows = len(run) - len(trials[0].road) // 2  # there is room for each, not for all
+    short = plan(problem, method="bry", history_size=6 * rows)
+    np.testing.assert_array_equal(short.history.segment_times, run[-rows:])
+    least = plan(problem, method="bry", history_size=1)
+    np.testing.assert_array_equal(least.history.segment_times, run[-1:])
+    trials.clear()
+    fast = {"velocity": [2.0, 0.0, 0.0]}
+    jump = plan(SHORT[:2], method="bry", **JERK, start=fast, end=fast)
+    assert jump.iterations == sum(found.iterations for found in trials)
 
 
 @both

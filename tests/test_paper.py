@@ -17,6 +17,7 @@ import peakflight as pf
 import peakflight.paper
 from peakflight.cli.application import application
 from peakflight.compare import Row
+from peakflight.course import Course
 from peakflight.document import Document, Picture, Points, Section, Table, as_html, as_markdown
 from peakflight.formats import read_course
 from peakflight.paper import (
@@ -27,11 +28,13 @@ from peakflight.paper import (
     MELLINGER,
     PEAK,
     PRINTED,
+    RECONSTRUCTION,
     PaperComparison,
     Reproduction,
+    is_same,
     reproduce,
 )
-from peakflight.paper_page import PICTURE_FORMATS, write_paper
+from peakflight.paper_page import PICTURE_FORMATS, paper_document, write_paper
 
 Run = Callable[..., Result]
 COURSES = Path(__file__).parent.parent / "examples" / "courses"
@@ -113,9 +116,18 @@ def planned(printed: peakflight.paper.Printed, name: str) -> pf.Plan:
     return pf.plan(waypoints, method=method, degree=5, **options)
 
 
-def test_the_default_course_is_the_one_in_the_examples() -> None:
-    course = read_course(COURSES / f"{DEFAULT_COURSE.name}.csv")
-    np.testing.assert_array_equal(course.waypoints, DEFAULT_COURSE.waypoints)
+@pytest.mark.parametrize("known", [DEFAULT_COURSE, RECONSTRUCTION], ids=lambda known: known.name)
+def test_known_courses_are_those_in_the_examples(known: Course) -> None:
+    assert is_same(read_course(COURSES / f"{known.name}.csv"), known)
+
+
+def test_the_page_says_that_the_reconstruction_was_fitted() -> None:
+    pages = [
+        as_markdown(paper_document(reproduce(Course(course.waypoints, name="mine")), {}))
+        for course in (RECONSTRUCTION, DEFAULT_COURSE)
+    ]
+    assert ["is therefore no evidence" in page for page in pages] == [True, False]
+    assert ["a course of our own" in page for page in pages] == [False, True]
 
 
 def test_what_the_paper_prints() -> None:
@@ -211,7 +223,9 @@ class TestFiles:
             head, data = source.split(",", 1)
             assert head == "data:image/png;base64"
             assert base64.b64decode(data, validate=True).startswith(b"\x89PNG\r\n")
-        assert "http" not in text.replace("".join(sources), "")
+            text = text.replace(source, "")
+        assert len(text) < 100_000, "pictures are taken out"
+        assert "http" not in text
         assert "url(" not in text
         assert "@import" not in text
 

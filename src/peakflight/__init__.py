@@ -18,19 +18,24 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem
 from peakflight.result import History, Plan, Report
 from peakflight.trajectory import Trajectory
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VEHICLES, find_vehicle
 from peakflight.version import __version__
 from peakflight.yaw import Heading
 
 if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
+    from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
     from peakflight.planner import plan, replan
     from peakflight.spline import minimum_effort_spline
 
 __all__ = [
     "GRAVITY",
     "KINDS",
+    "VEHICLES",
     "Course",
+    "FlatStates",
     "Heading",
     "History",
     "InvalidFile",
@@ -43,25 +48,34 @@ __all__ = [
     "Report",
     "Status",
     "Trajectory",
+    "Vehicle",
     "__version__",
     "certify",
     "certify_plan",
     "discretised_bound",
+    "find_vehicle",
+    "flat_states",
     "minimum_effort_spline",
     "plan",
+    "planned_states",
     "read_course",
     "replan",
+    "states_along",
     "stretch_to_limits",
     "tidy",
 ]
 
 _LAZY = {
+    "FlatStates": "peakflight.flatness",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
     "discretised_bound": "peakflight.bound",
+    "flat_states": "peakflight.flatness",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
+    "planned_states": "peakflight.flatness",
     "replan": "peakflight.planner",
+    "states_along": "peakflight.flatness",
     "stretch_to_limits": "peakflight.certificate",
 }
 

@@ -31,9 +31,11 @@ from peakflight.paper import (
     JOINT,
     MELLINGER,
     PEAK,
+    RECONSTRUCTION,
     PaperComparison,
     Reproduction,
     figures_csv,
+    is_same,
     leg_times_csv,
     methods_csv,
 )
@@ -177,17 +179,22 @@ def _draw(
 
 def _course_section(result: Reproduction) -> Section:
     course = result.course
-    if course is DEFAULT_COURSE:
-        place = (
-            f"In their place stands {as_code(course.name)}, a course of our own of the kind that "
-            "it describes: a tight section at the start, then long straight sections and gentle "
-            "curves."
+    if is_same(course, DEFAULT_COURSE):
+        kind = (
+            ", a course of our own of the kind that it describes: a tight section at the start, "
+            "then long straight sections and gentle curves"
+        )
+    elif is_same(course, RECONSTRUCTION):
+        kind = (
+            ", a reconstruction: a course that was searched for so that the six total times come "
+            "out near the paper's. That they agree is therefore no evidence of anything"
         )
     else:
-        place = f"In their place stands the course {as_code(course.name)}."
+        kind = ""
     text = (
-        f"The paper does not print its waypoints. {place} So totals need not agree with the "
-        "paper's; what can be looked at is the order of the methods, and about how much each gains."
+        "The paper does not print its waypoints. In their place stands the course "
+        f"{as_code(course.name)}{kind}. What can be looked at is the order of the methods, and "
+        "about how much each gains; totals need not agree with the paper's."
     )
     if len(course) > MOST_WAYPOINTS:
         return Section("The course", (text, f"It has {len(course)} waypoints; see `paper.json`."))
@@ -249,8 +256,10 @@ def _comparison_section(one: PaperComparison, pictures: tuple[Picture, ...]) -> 
 def _reasons(result: Reproduction) -> tuple[str, ...]:
     jerk, snap = result.comparisons
     rates = Algorithm1Settings()
+    fitted = is_same(result.course, RECONSTRUCTION)
     reasons = [
-        "The waypoints are others, as the paper does not print its own.",
+        "The waypoints are others, as the paper does not print its own."
+        + (" These were fitted to its total times, and to nothing else so closely." * fitted),
         "Every total here is that of a plan that is proven to keep every limit at every instant. "
         "The paper iterates until the largest ratio of peak to limit is from 0.95 to 1.05 in each "
         "segment. Of its minimum-snap run it says that it "
@@ -265,12 +274,18 @@ def _reasons(result: Reproduction) -> tuple[str, ...]:
         + " ".join(_algorithm_1(one) for one in (jerk, snap)),
         "Of Mellinger's method the paper says that its distribution of segment times is "
         '"not very different from the initial guess as it settled quickly at a local minima". '
-        + " ".join(filter(None, (_mellinger(one) for one in (jerk, snap)))),
+        + "".join(_joined(_mellinger(one) for one in (jerk, snap))),
+        *_joined(_speed(one) for one in (jerk, snap)),
         "`joint` goes beyond the paper, which states the complete problem and solves it by "
-        "alternation. " + " ".join(filter(None, (_joint(one) for one in (jerk, snap)))),
+        "alternation. " + "".join(_joined(_joint(one) for one in (jerk, snap))),
     ]
-    reasons.insert(-1, " ".join(filter(None, (_speed(one) for one in (jerk, snap)))))
-    return tuple(reason.strip() for reason in reasons if reason)
+    return tuple(reason.strip() for reason in reasons)
+
+
+def _joined(sentences: Iterable[str]) -> tuple[str, ...]:
+    """One text of what there is to say, or none."""
+    text = " ".join(filter(None, sentences))
+    return (text,) if text else ()
 
 
 def _algorithm_1(one: PaperComparison) -> str:

@@ -42,10 +42,13 @@ def plan(
     Parameters
     ----------
     problem
-        A `Problem`; or waypoints (K+1, 3) in m, with `limits` and any of the other options of
-        `Problem` beside them. Waypoints closer than 1 mm are then merged, and the plan says so.
+        A `Problem`; or waypoints (K+1, 3) in m, with `limits`, `vehicle` or both and any of the
+        other options of `Problem` beside them. Waypoints closer than 1 mm are then merged, and the
+        plan says so.
     method
         One of `peakflight.methods.METHODS`.
+    limits
+        What to keep. Beside a vehicle, only what shall differ from its default limits.
     settings
         The `Settings` of the method's module; None for its defaults.
     options
@@ -129,7 +132,8 @@ def replan(
     last
         The last plan.
     waypoints, limits
-        What has changed.
+        What has changed. If the problem has a vehicle, limits that are not set stay as they were;
+        another `vehicle` brings its own.
     options
         Further options of `Problem`, or fields of the settings of the plan's method.
 
@@ -141,7 +145,7 @@ def replan(
     changes = {name: options.pop(name) for name in _fields(Problem) & set(options)}
     if waypoints is not None:
         changes["waypoints"] = waypoints
-    if limits is not None:
+    if limits is not None or "vehicle" in changes:
         changes["limits"] = limits
     if "initial" in _fields(methods.find(last.method).Settings):
         options.setdefault("initial", last)
@@ -203,8 +207,6 @@ def _fields(kind: Any) -> set[str]:
 def _tidied(
     waypoints: ArrayLike, limits: Limits | None, options: dict[str, Any]
 ) -> tuple[Problem, tuple[str, ...]]:
-    if limits is None:
-        raise InvalidProblem("limits is missing; give limits=peakflight.Limits(speed=..., ...)")
     yaw = options.pop("yaw", None)
     heading = None if yaw is None else as_heading(yaw)
     course, notes = tidy(
@@ -221,7 +223,7 @@ def _tidied(
     unknown = set(options) - _fields(Problem)
     if unknown:
         raise InvalidProblem(f"unknown option {min(unknown)!r}")
-    return Problem(course.waypoints, limits=limits, yaw=yaw, **options), notes
+    return Problem(course.waypoints, limits=limits, yaw=yaw, **options), notes  # type: ignore[arg-type]
 
 
 def _contradiction(problem: Problem) -> str:

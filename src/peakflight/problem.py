@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, LimitKind, Limits
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VehicleLike, find_vehicle
 from peakflight.yaw import Heading, HeadingLike, as_heading
 
 DERIVATIVE_NAMES = ("position", "velocity", "acceleration", "jerk", "snap", "crackle", "pop")
@@ -118,7 +120,11 @@ class Problem:
 
     waypoints: np.ndarray
     """(K+1, 3) m, z up; two at least, no two in a row alike."""
-    limits: Limits = field(kw_only=True)
+    limits: Limits = field(default=None, kw_only=True)  # type: ignore[assignment]
+    """What to keep; beside a vehicle only what shall differ from its own, and then the whole."""
+    vehicle: VehicleLike | None = field(default=None, kw_only=True)
+    """What flies: a `Vehicle`, the name of one (`peakflight.VEHICLES`) or the path of its file;
+    then the `Vehicle`, with the limits of this problem."""
     minimize: str | Mapping[str | int, float] | Sequence[float] = field(
         default="jerk", kw_only=True
     )
@@ -142,8 +148,18 @@ class Problem:
         waypoints = _waypoints(self.waypoints)
         legs, axes = len(waypoints) - 1, waypoints.shape[1]
         object.__setattr__(self, "waypoints", waypoints)
-        if not isinstance(self.limits, Limits):
+        if self.limits is None and self.vehicle is None:
+            raise InvalidProblem(
+                "limits is missing; give limits=peakflight.Limits(speed=..., ...) or vehicle=..."
+            )
+        if not isinstance(self.limits, Limits | None):
             raise InvalidProblem(f"limits is {self.limits!r}; it must be a peakflight.Limits")
+        if self.vehicle is not None:
+            vehicle = find_vehicle(self.vehicle)
+            if self.limits is not None:
+                vehicle = vehicle.with_limits(self.limits)
+            object.__setattr__(self, "vehicle", vehicle)
+            object.__setattr__(self, "limits", vehicle.limits)
         if all(getattr(self.limits, name) is None for name in BOUNDING):
             raise InvalidProblem(
                 f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
@@ -224,6 +240,7 @@ class Problem:
         return {
             "waypoints": self.waypoints.tolist(),
             "limits": self.limits.to_dict(),
+            "vehicle": _vehicle_to_dict(self.vehicle),
             "minimize": minimize,
             "degree": self.degree,
             "continuity": self.continuity,
@@ -240,6 +257,9 @@ class Problem:
         for name in ("waypoints", "limits"):
             if name not in values:
                 raise InvalidProblem(f"{name} is missing")
+        if values.get("vehicle") is not None:
+            figures = dict(values["vehicle"])
+            values["vehicle"] = Vehicle.from_dict({**figures, "limits": values["limits"]})
         values["limits"] = Limits.from_dict(values["limits"])
         inner = values.get("derivatives") or {}
         values["derivatives"] = {int(index): state for index, state in inner.items()}
@@ -317,19 +337,7 @@ def fixed_state(
 
     Orders that are not given are zero up to `zeros`, and free beyond.
     """
-    if state is None:
-        state = {}
-    if isinstance(state, Mapping):
-        rows = {_order(name, key): value for key, value in state.items()}
-    else:
-        try:
-            numbers = [[_number(x) for x in row] for row in state]  # type: ignore[union-attr]
-        except TypeError:
-            raise InvalidProblem(
-                f"{name} is {state!r}; it must be rows of {axes} numbers"
-            ) from None
-        array = as_float_array(name, numbers or np.empty((0, axes)), (None, axes))
-        rows = dict(enumerate(array, start=1))
+    rows = {} if state is None else _rows(name, state, axes)
     count = max([zeros, *rows])
     if count >= degree:
         raise InvalidProblem(
@@ -338,11 +346,30 @@ def fixed_state(
     full = np.full((count, axes), math.nan)
     full[:zeros] = 0.0
     for order, row in rows.items():
-        full[order - 1] = as_float_array(f"{name} derivative {order}", row, (axes,))
+        full[order - 1] = row
     if np.isinf(full).any():
         raise InvalidProblem(f"{name} has an infinite derivative")
     full.setflags(write=False)
     return full
+
+
+def _rows(name: str, state: StateLike, axes: int) -> dict[int, np.ndarray]:
+    """Order to (axes,) of the derivatives that are given, by name, by order or row by row."""
+    if isinstance(state, Mapping):
+        return {
+            order: as_float_array(f"{name} derivative {order}", row, (axes,))
+            for order, row in ((_order(name, key), row) for key, row in state.items())
+        }
+    rows: Any = state
+    if not (isinstance(state, np.ndarray) and state.dtype == np.float64):
+        try:
+            numbers = [[_number(x) for x in row] for row in state]  # type: ignore[union-attr]
+            rows = numbers or np.empty((0, axes))
+        except TypeError:
+            raise InvalidProblem(
+                f"{name} is {state!r}; it must be rows of {axes} numbers"
+            ) from None
+    return dict(enumerate(as_float_array(name, rows, (None, axes)), start=1))
 
 
 def _order(name: str, key: str | int) -> int:
@@ -368,6 +395,14 @@ def _numbers(state: Any) -> list[list[float | None]]:
 
 def _listed(array: Any) -> list[Any] | None:
     return None if array is None else array.tolist()
+
+
+def _vehicle_to_dict(vehicle: VehicleLike | None) -> dict[str, Any] | None:
+    """A vehicle without its limits, which stand beside it, and the reasons for them."""
+    if not isinstance(vehicle, Vehicle):
+        return None
+    beside = ("limits", "reasons")
+    return {name: value for name, value in vehicle.to_dict().items() if name not in beside}
 
 
 def _weights(minimize: str | Mapping[str | int, float] | Sequence[float]) -> dict[int, float]:

@@ -12,6 +12,7 @@ from peakflight.errors import InvalidFile, InvalidProblem, Status
 from peakflight.files import PathLike, read_json, write_json
 from peakflight.problem import Problem, as_float_array
 from peakflight.trajectory import Trajectory
+from peakflight.vehicle import Vehicle
 
 BINDING = 1.0 - 1e-3
 """A limit binds a segment whose certified peak comes this close to it."""
@@ -131,6 +132,12 @@ class Plan:
     """Version of peakflight that made it."""
     memory: Any = field(default=None, repr=False)
     """What its method keeps to plan a similar problem faster; not written to files."""
+
+    @property
+    def vehicle(self) -> Vehicle | None:
+        """What flies it, if the problem says so."""
+        vehicle = self.problem.vehicle
+        return vehicle if isinstance(vehicle, Vehicle) else None
 
     @property
     def feasible(self) -> bool:

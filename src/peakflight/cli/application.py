@@ -28,6 +28,7 @@ from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
+from peakflight.cli.vehicles import vehicles
 from peakflight.errors import PeakflightError
 
 BUG = 3
@@ -104,6 +105,7 @@ application.add_command(plan)
 application.add_command(check)
 application.add_command(compare)
 application.add_command(paper)
+application.add_command(vehicles)
 
 
 def _report(error: Exception, arguments: Sequence[str]) -> int:

@@ -58,7 +58,7 @@ def check(file: Path, limits: Limits | None, as_json: bool) -> int:
         report = certify_plan(plan)
         false_claims = _false_claims(values, plan, report)
         if limits is not None:
-            plan = replace(plan, problem=replace(plan.problem, limits=limits))
+            plan = replace(plan, problem=replace(plan.problem, limits=limits, vehicle=None))
             report = certify_plan(plan)
     if as_json:
         print_json(_as_dict(plan, report, false_claims))
@@ -138,6 +138,7 @@ def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[st
         "limits": plan.problem.limits.to_dict(),
         "worst": worst,
         "duration": plan.duration,
+        "vehicle": None if plan.vehicle is None else plan.vehicle.name,
         "continuity": plan.problem.spline_class.continuity,
         "false_claims": list(false_claims),
     }
@@ -147,6 +148,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
     out = Printout()
     out.path(
         f"{file}: {seconds(plan.duration)} s, {len(plan.trajectory)} segments, by {plan.method}"
+        + ("" if plan.vehicle is None else f", for {plan.vehicle.name}")
     )
     if report.feasible:
         out.line("feasible: proven at every instant, from the coefficients alone", "good")

@@ -11,7 +11,13 @@ import click
 from peakflight.cli.compare_output import print_comparisons
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, file_name
-from peakflight.cli.options import common_options, limits_option, spline_options
+from peakflight.cli.options import (
+    FolderPath,
+    common_options,
+    limits_option,
+    spline_options,
+    vehicle_option,
+)
 from peakflight.cli.output import print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
@@ -19,6 +25,7 @@ from peakflight.files import write_atomically
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import METHODS
 from peakflight.problem import Problem
+from peakflight.vehicle import Vehicle
 from peakflight.version import __version__
 
 if TYPE_CHECKING:
@@ -56,6 +63,7 @@ def _methods(
     is_flag=True,
     help="Find about how fast any motion could be, too; takes seconds, and the extra bound.",
 )
+@vehicle_option
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
@@ -63,7 +71,7 @@ def _methods(
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FolderPath(),
     metavar="DIR",
     help=f"Folder for {TABLE_FILE}, {DATA_FILE} and the pictures; by default none is written.",
 )
@@ -72,6 +80,7 @@ def compare(
     courses: tuple[Path, ...],
     methods: tuple[str, ...] | None,
     bound: bool,
+    vehicle: Vehicle | None,
     limits: Limits | None,
     minimize: str,
     degree: int | None,
@@ -101,7 +110,8 @@ def compare(
                 _problem(
                     path,
                     course.waypoints,
-                    limits=limits or PAPER_LIMITS,
+                    vehicle=vehicle,
+                    limits=limits if vehicle else limits or PAPER_LIMITS,
                     minimize=minimize,
                     degree=degree,
                     continuity=continuity,
@@ -129,7 +139,8 @@ def compare(
             comparisons,
             _summaries(comparisons),
             notes=notes,
-            default_limits=limits is None,
+            vehicle=vehicle,
+            given_limits=limits,
             folder=output,
             files=files,
             remarks=remarks,
@@ -201,6 +212,7 @@ def _values(
         courses.append({**values, "file": str(path), "notes": [*said, *values["notes"]]})
     return {
         "limits": problem.limits.to_dict(),
+        "vehicle": problem.to_dict()["vehicle"],
         "minimize": problem.minimize,
         "degree": problem.degree,
         "continuity": problem.continuity,
@@ -222,6 +234,20 @@ def _write(
     return {"table": folder.published(TABLE_FILE), "data": folder.published(DATA_FILE)}
 
 
+def _stems(comparisons: Sequence["Comparison"]) -> list[str]:
+    """What files of each course begin with; no two alike, even where case does not count."""
+    stems: list[str] = []
+    for one in comparisons:
+        stem = name = file_name(one.name)
+        taken = {other.lower() for other in stems}
+        number = 1
+        while stem.lower() in taken:
+            number += 1
+            stem = f"{name}-{number}"
+        stems.append(stem)
+    return stems
+
+
 def _draw(
     comparisons: Sequence["Comparison"], folder: OutputFolder, progress: Progress
 ) -> tuple[dict[str, Path], tuple[str, ...]]:
@@ -231,13 +257,8 @@ def _draw(
     except MissingExtra as error:
         return {}, (f"no pictures: {error}",)
     files, remarks = {}, []
-    stems: Counter[str] = Counter()
-    for done, one in enumerate(comparisons):
+    for done, (one, stem) in enumerate(zip(comparisons, _stems(comparisons), strict=True)):
         progress.stage(f"drawing {one.name}", done / len(comparisons))
-        stem = file_name(one.name)
-        stems[stem.lower()] += 1  # some systems do not tell small letters from large ones
-        if stems[stem.lower()] > 1:
-            stem = f"{stem}-{stems[stem.lower()]}"
         plans = {row.method: row.plan for row in one.rows if row.certified and row.plan is not None}
         if not plans:
             remarks.append(f"no pictures of {one.name}: no method has a certified plan")

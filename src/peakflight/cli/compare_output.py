@@ -4,8 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from peakflight.cli.options import written
+from peakflight.cli.options import limits_source, written
 from peakflight.cli.output import Printout, seconds
+from peakflight.limits import Limits
+from peakflight.vehicle import Vehicle
 from peakflight.yaw import ALL_LABELS
 
 if TYPE_CHECKING:
@@ -20,7 +22,8 @@ def print_comparisons(
     summaries: Sequence["Summary"],
     *,
     notes: Sequence[Sequence[str]],
-    default_limits: bool,
+    vehicle: Vehicle | None,
+    given_limits: Limits | None,
     folder: Path | None,
     files: Mapping[str, Path],
     remarks: Sequence[str],
@@ -31,6 +34,8 @@ def print_comparisons(
     ----------
     summaries
         Medians over the courses; none for a single one.
+    given_limits
+        What the user has limited; None for the defaults of the vehicle, or the paper's.
     notes
         About each course.
     remarks
@@ -38,8 +43,7 @@ def print_comparisons(
     """
     out = Printout()
     problem = comparisons[0].problem
-    source = " (the paper's)" if default_limits else ""
-    out.path(f"limits{source}: {written(problem.limits)}")
+    out.path(f"limits{limits_source(vehicle, given_limits)}: {written(problem.limits)}")
     for one, said in zip(comparisons, notes, strict=True):
         out.line()
         _print_course(out, one, said)

@@ -2,14 +2,30 @@
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, LimitKind, Limits
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VEHICLES, find_vehicle
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+class FolderPath(click.Path):
+    """A folder that may not exist yet."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """As a `Path`; an empty name would be the current folder."""
+        if not str(value).strip():
+            self.fail("the name is empty; write . for the current folder", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 def parse_limits(text: str) -> Limits:
@@ -49,6 +65,25 @@ def written(limits: Limits, separator: str = ",") -> str:
         number = f"{math.degrees(value):.10g}deg" if kind.unit == "rad" else f"{value:.10g}"
         items.append(f"{kind.name}={number}")
     return separator.join(items)
+
+
+def limits_source(vehicle: Vehicle | None, given: Limits | None) -> str:
+    """Where limits are from, in brackets: the vehicle, the paper, or nothing if all are given."""
+    if vehicle is None:
+        return "" if given else " (the paper's)"
+    but = f" but {', '.join(given.to_dict())}" if given else ""
+    return f" (of {vehicle.name}{but})"
+
+
+def vehicle_option(command: _Command) -> _Command:
+    """Option `--vehicle` of a command, a `Vehicle`; None if not given."""
+    return click.option(
+        "--vehicle",
+        metavar="NAME|FILE.yaml",
+        callback=vehicle_of,
+        help=f"What flies: {', '.join(VEHICLES)}, or a file of your own; see peakflight vehicles. "
+        "Its limits are kept, but for those that --limits names.",
+    )(command)
 
 
 def limits_option(help: str, default: Limits | None = None) -> Callable[[_Command], _Command]:
@@ -111,6 +146,16 @@ def _limits(
         return None
     try:
         return parse_limits(",".join(texts))
+    except InvalidProblem as error:
+        raise click.BadParameter(str(error), context, parameter) from None
+
+
+def vehicle_of(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> Vehicle | None:
+    """Find the vehicle that an option or argument names."""
+    try:
+        return None if text is None else find_vehicle(text)
     except InvalidProblem as error:
         raise click.BadParameter(str(error), context, parameter) from None
 

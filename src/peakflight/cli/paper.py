@@ -7,7 +7,7 @@ import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder
-from peakflight.cli.options import common_options
+from peakflight.cli.options import FolderPath, common_options
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, InvalidProblem
@@ -24,7 +24,7 @@ FOLDER = Path("out/paper")
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FolderPath(),
     metavar="DIR",
     default=FOLDER,
     help=f"Folder for the page, its pictures and its tables; by default {FOLDER.as_posix()}.",

@@ -8,7 +8,13 @@ import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, folder_for
-from peakflight.cli.options import common_options, limits_option, spline_options
+from peakflight.cli.options import (
+    FolderPath,
+    common_options,
+    limits_option,
+    spline_options,
+    vehicle_option,
+)
 from peakflight.cli.output import print_json
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
@@ -19,6 +25,7 @@ from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.result import Plan
+from peakflight.vehicle import Vehicle
 
 PLAN_FILE = "plan.json"
 PICTURES = {
@@ -26,6 +33,7 @@ PICTURES = {
     "derivatives": "what is limited, against time",
     "segment_times": "times of the legs, by iteration",
     "yaw": "yaw, its rate and its acceleration, against time",
+    "rotors": "rotor thrusts and body rates, against time",
 }
 """Name without .png, and what it shows."""
 VARIANTS = ("descent", "paper")
@@ -88,6 +96,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
+@vehicle_option
 @limits_option("Limits to keep.", default=PAPER_LIMITS)
 @yaw_options
 @spline_options
@@ -103,7 +112,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FolderPath(),
     metavar="DIR",
     help="Folder for the files; by default COURSE-plan, after the name of the course.",
 )
@@ -117,6 +126,7 @@ def plan(
     max_pieces: int | None,
     effort: float | None,
     time_limit: float | None,
+    vehicle: Vehicle | None,
     limits: Limits | None,
     yaw: dict[str, Any] | None,
     yaw_limits: dict[str, float | None] | None,
@@ -137,6 +147,7 @@ def plan(
     \b
     Example:
       peakflight plan course.csv --limits speed=5,jerk=62,tilt=50deg -o race
+      peakflight plan course.csv --vehicle crazyflie-2.1-upgrade --limits speed=3
     """  # noqa: D301
     tuning = {
         "time_penalty": time_penalty,
@@ -153,7 +164,8 @@ def plan(
         read, notes = read_tidied(course, strict=strict)
         problem = Problem(
             read.waypoints,
-            limits=limits or PAPER_LIMITS,
+            vehicle=vehicle,
+            limits=limits if vehicle else limits or PAPER_LIMITS,  # type: ignore[arg-type]
             minimize=minimize,
             degree=degree,
             continuity=continuity,
@@ -187,7 +199,7 @@ def plan(
             answer,
             course=read.name,
             variant=variant,
-            default_limits=limits is None,
+            given_limits=limits,
             before=notes,
             after=more,
             folder=folder.path,

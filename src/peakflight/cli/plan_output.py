@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from peakflight.cli.options import written
+from peakflight.cli.options import limits_source, written
 from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
 from peakflight.cli.yaw_options import written_yaw
+from peakflight.limits import Limits
 from peakflight.result import Plan
 from peakflight.yaw import ALL_LABELS
 
@@ -23,7 +24,7 @@ def print_plan(
     *,
     course: str,
     variant: str | None,
-    default_limits: bool,
+    given_limits: Limits | None,
     before: Sequence[str],
     after: Sequence[str],
     folder: Path,
@@ -34,6 +35,8 @@ def print_plan(
 
     Parameters
     ----------
+    given_limits
+        What the user has limited; None for the defaults of the vehicle, or the paper's.
     before, after
         Notes about the course and about the files.
     files, summaries
@@ -43,7 +46,7 @@ def print_plan(
     waypoints = len(plan.problem.waypoints)
     out.line(f"{course}: {waypoints} waypoints, {waypoints - 1} legs", "title")
     _print_notes(out, before)
-    source = " (the paper's)" if default_limits else ""
+    source = limits_source(plan.vehicle, given_limits)
     out.path(f"limits{source}: {written(plan.problem.limits)}")
     if plan.problem.heading is not None:
         out.path(f"yaw: {written_yaw(plan.problem.heading)}")

@@ -57,7 +57,7 @@ class Progress:
         logging.getLogger("peakflight").removeHandler(self._handler)
 
     def stage(self, text: str, part: float | None = None) -> None:
-        """Say what begins now, and which part of all the work, from 0 to 1, is done by then."""
+        """Say what begins now, and which part of work of its kind, from 0 to 1, is done by then."""
         with self._lock:
             self._text = text
             self._part = part

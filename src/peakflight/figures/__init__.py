@@ -21,6 +21,7 @@ from peakflight.figures.flights import Flight, in_sequence, side_by_side
 from peakflight.figures.leg_times import leg_times_figure
 from peakflight.figures.overlaid_derivatives import overlaid_derivatives_figure
 from peakflight.figures.paths import paths_figure
+from peakflight.figures.rotors import rotors_figure
 from peakflight.figures.saving import save_figures, write_figure
 from peakflight.figures.segment_times import segment_times_figure
 from peakflight.figures.yaw import yaw_figure
@@ -35,6 +36,7 @@ __all__ = [
     "leg_times_figure",
     "overlaid_derivatives_figure",
     "paths_figure",
+    "rotors_figure",
     "save_figures",
     "segment_times_figure",
     "side_by_side",

@@ -1,7 +1,6 @@
 """What is limited, against time, with the limits."""
 
 import textwrap
-from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -60,10 +59,10 @@ def derivatives_figure(plan: Plan) -> Figure:
     trajectory, limits = plan.trajectory, plan.problem.limits
     times, curves = sampled_curves(trajectory)
     kinds = shown_kinds(limits, curves)
-    figure = new_figure(panels_height(kinds) + TOP)
+    figure = new_figure(panels_height(len(kinds)) + TOP)
     write_headline(figure, plan, 0.12)
     write_note(figure, KEY, WIDTH - 0.12)
-    panels = add_panels(figure, kinds)
+    panels = add_panels(figure, len(kinds))
     for kind, axes in zip(kinds, panels, strict=True):
         values = curves[kind.name]
         axes.plot(times.ravel(), values.ravel(), color=INK, linewidth=1.0, zorder=3)
@@ -105,15 +104,15 @@ def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind
     ]
 
 
-def panels_height(kinds: Sequence[LimitKind]) -> float:
-    """Height of a figure of panels without what stands above them, in."""
-    return BOTTOM + len(kinds) * PANEL + (len(kinds) - 1) * GAP
+def panels_height(count: int) -> float:
+    """Height of a figure of panels under one another, without what stands above them, in."""
+    return BOTTOM + count * PANEL + (count - 1) * GAP
 
 
-def add_panels(figure: Figure, kinds: Sequence[LimitKind]) -> list[Axes]:
-    """Put a panel for each kind under one another, with one axis of time; the first is on top."""
+def add_panels(figure: Figure, count: int) -> list[Axes]:
+    """Put panels under one another, with one axis of time; the first is on top."""
     panels = []
-    for row in range(len(kinds)):
+    for row in range(count):
         bottom = BOTTOM + row * (PANEL + GAP)
         axes = add_axes(figure, LEFT, bottom, WIDTH - LEFT - RIGHT, PANEL)
         axes.tick_params(labelbottom=row == 0)

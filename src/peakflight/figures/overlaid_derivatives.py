@@ -28,9 +28,9 @@ def overlaid_derivatives_figure(flights: Sequence[Flight], limits: Limits, *, ti
     begin = min(flight.trajectory.start_time for flight in flights)
     end = max(flight.trajectory.end_time for flight in flights)
     kinds = shown_kinds(limits, curves[0][1])
-    figure = new_figure(panels_height(kinds) + LEGEND_TOP + legend_height(flights) + ABOVE)
+    figure = new_figure(panels_height(len(kinds)) + LEGEND_TOP + legend_height(flights) + ABOVE)
     write_title(figure, title, 0.12)
-    panels = add_panels(figure, kinds)
+    panels = add_panels(figure, len(kinds))
     for kind, axes in zip(kinds, panels, strict=True):
         for flight, (times, values) in zip(flights, curves, strict=True):
             axes.plot(times.ravel(), values[kind.name].ravel(), zorder=3, **flight.line_style)

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from peakflight.errors import InvalidFile
 from peakflight.figures.course import course_figure
 from peakflight.figures.derivatives import derivatives_figure
+from peakflight.figures.rotors import rotors_figure
 from peakflight.figures.segment_times import segment_times_figure
 from peakflight.figures.yaw import yaw_figure
 from peakflight.files import PathLike, prepare_folder, write_atomically
@@ -23,6 +24,8 @@ FIGURES = {
 """Name of file to what draws it."""
 YAW_FIGURES = {"yaw": yaw_figure}
 """As `FIGURES`, for plans that have a yaw motion."""
+VEHICLE_FIGURES = {"rotors": rotors_figure}
+"""As `FIGURES`, for plans that have a vehicle."""
 
 
 def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[Path]:
@@ -33,7 +36,8 @@ def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[P
     plan
         What to draw, feasible or not.
     folder
-        Gets `course`, `derivatives`, `segment_times` and, if the plan has a yaw motion, `yaw`;
+        Gets `course`, `derivatives` and `segment_times`, with a yaw motion `yaw`, and with a
+        vehicle `rotors`;
         nothing is left half written.
     format
         "png", "pdf" or "svg".
@@ -51,7 +55,11 @@ def save_figures(plan: Plan, folder: PathLike, *, format: str = "png") -> list[P
         raise InvalidFile(f"{folder}: format {format!r} is unknown; known are {', '.join(FORMATS)}")
     target = prepare_folder(folder)
     paths = []
-    wanted = FIGURES if plan.yaw_motion is None else FIGURES | YAW_FIGURES
+    wanted = dict(FIGURES)
+    if plan.yaw_motion is not None:
+        wanted |= YAW_FIGURES
+    if plan.vehicle is not None:
+        wanted |= VEHICLE_FIGURES
     for name, draw in wanted.items():
         paths.append(target / f"{name}.{format}")
         write_figure(draw(plan), paths[-1])

@@ -49,7 +49,9 @@ COURSE_READERS = {
 """In the order in which they are asked; CSV recognises what is left."""
 
 FLIGHT_WRITERS = {
-    "samples": Writer("samples.csv", write_samples, "time, position to snap and yaw at 100 Hz"),
+    "samples": Writer(
+        "samples.csv", write_samples, "time, position to snap, yaw and rotor thrusts at 100 Hz"
+    ),
     "crazyflie": Writer("crazyflie.csv", write_crazyflie, "polynomials for a Crazyflie"),
 }
 

@@ -1,4 +1,4 @@
-"""Samples of a flight at a fixed rate, as CSV: time, position to snap, and yaw."""
+"""Samples of a flight at a fixed rate, as CSV: time, position to snap, yaw, and what rotors do."""
 
 import math
 
@@ -6,9 +6,10 @@ import numpy as np
 
 from peakflight.errors import InvalidProblem
 from peakflight.files import PathLike, write_atomically
-from peakflight.formats.heading import heading
+from peakflight.heading import heading
 from peakflight.problem import AXES
 from peakflight.result import Plan
+from peakflight.vehicle import Vehicle
 
 RATE = 100.0
 """Samples a second: what motion capture gives and position controllers take."""
@@ -17,6 +18,12 @@ MOST_ROWS = 5_000_000
 PREFIXES = ("", "v", "a", "j", "s")
 """Of the columns of position, velocity, acceleration, jerk and snap."""
 YAW_COLUMNS = ("yaw [rad]", "yaw_rate [rad/s]", "yaw_acceleration [rad/s^2]")
+STATES = (
+    *(f"q{part} [1]" for part in "wxyz"),
+    *(f"w{axis} [rad/s]" for axis in AXES),
+    *(f"f{rotor} [N]" for rotor in (1, 2, 3, 4)),
+)
+"""Columns of a vehicle: its attitude, body rates and rotor thrusts."""
 UNITS = ("m", "m/s", "m/s^2", "m/s^3", "m/s^4")
 NEAR_END = 1e-3
 """A sample this part of a period before the end is the end: both would print the same time."""
@@ -26,9 +33,9 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
     """Write time, position, velocity, acceleration, jerk, snap and yaw, one row a sample.
 
     Samples begin at the start time and follow each other by 1/rate; the last one is at the end,
-    wherever that falls. Yaw, its rate and its acceleration are there if the plan has a yaw
-    motion. Times have 15 significant digits, so that they stay apart whatever the start time,
-    other numbers 9.
+    wherever that falls. Yaw, its rate and its acceleration are there if the plan has a yaw motion;
+    attitude, body rates and rotor thrusts if it has a vehicle (`peakflight.planned_states`). Times
+    have 15 significant digits, so that they stay apart whatever the start time, other numbers 9.
 
     Parameters
     ----------
@@ -37,7 +44,7 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
 
     Returns
     -------
-    Notes for whoever flies the file: none.
+    Notes for whoever flies the file: where rotors are asked for more than the vehicle's have.
 
     Raises
     ------
@@ -56,11 +63,32 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
         orders = range(1 if plan.yaw_motion is None else len(YAW_COLUMNS))
         columns += [heading(plan)(times, derivative=order).T for order in orders]
         names += YAW_COLUMNS[: len(orders)]
+    if plan.vehicle is not None:
+        from peakflight.flatness import planned_states
+
+        states = planned_states(plan, times)
+        notes = _beyond(states.rotor_thrust, plan.vehicle)
+        columns += [states.attitude.T, states.body_rate.T, states.rotor_thrust.T]
+        names += STATES
+    else:
+        notes = ()
     table = np.vstack(columns).T + 0.0  # no negative zeros
     row = "%.15g" + ",%.9g" * (table.shape[1] - 1)
     lines = [",".join(names), *(row % tuple(values) for values in table.tolist())]
     write_atomically(path, "\n".join(lines) + "\n")
-    return ()
+    return notes
+
+
+def _beyond(thrusts: np.ndarray, vehicle: Vehicle) -> tuple[str, ...]:
+    """A note if any of (n, 4) thrusts is out of the range of the rotors."""
+    least, most = vehicle.rotor_thrust
+    lowest, highest = float(thrusts.min()), float(thrusts.max())
+    if least <= lowest and highest <= most:
+        return ()
+    return (
+        f"flown exactly, at this yaw, it takes {lowest:.3g} to {highest:.3g} N of a rotor; "
+        f"{vehicle.name} has {least:.3g} to {most:.3g} N",
+    )
 
 
 def _times(plan: Plan, rate: float) -> np.ndarray:

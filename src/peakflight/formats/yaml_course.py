@@ -36,6 +36,19 @@ def read(text: str, path: PathLike) -> Course:
     MissingExtra
         If PyYAML is not installed.
     """
+    return course_from(Tree(parse(text, path), path))
+
+
+def parse(text: str, path: PathLike) -> Any:
+    """The value of YAML `text`: numbers, text, lists and mappings; `path` is named in errors.
+
+    Raises
+    ------
+    InvalidFile
+        If it is not YAML, or more than one document; the message names the line.
+    MissingExtra
+        If PyYAML is not installed.
+    """
     try:
         import yaml
     except ImportError:
@@ -44,12 +57,11 @@ def read(text: str, path: PathLike) -> Course:
         ) from None
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        root = _Builder(yaml.parse(text, Loader=loader), path).document()
+        return _Builder(yaml.parse(text, Loader=loader), path).document()
     except PeakflightError:
         raise
     except (yaml.YAMLError, ValueError) as error:  # the second from broken escapes
         raise InvalidFile(f"{path}: {_wrong(text, error)}") from None
-    return course_from(Tree(root, path))
 
 
 def _wrong(text: str, error: Exception) -> str:
@@ -83,7 +95,7 @@ class _Builder:
         next(self._events)  # the document ends
         event = next(self._events)
         if type(event).__name__ != "StreamEndEvent":
-            raise self._error(event, "a second document begins; a course is one")
+            raise self._error(event, "a second document begins; a file holds one")
         return value
 
     def _value(self, event: Any, depth: int) -> Any:

@@ -8,9 +8,9 @@ steps) closes the gap between that bound and an attained value to a relative tol
 bounded beforehand and added to the control points, so that the bound holds for the polynomial that
 is written in the file, in exact arithmetic.
 
-A new kind of limit is one branch in `_quotient` and one in `_ratio`, or, where that is not enough,
-in `_range`: kinds from TURNING on are about several derivatives at once (`kernels.turning`). Kinds
-are numbered as in `limits.KINDS`.
+A new kind of limit is a branch in `_range` and one in `_ratio`. Norms of one derivative need no
+more; tilt and least thrust are quotients (`_quotient`); kinds from TURNING on are about several
+derivatives at once (`kernels.turning`). Kinds are numbered as in `limits.KINDS`.
 """
 
 import numpy as np
@@ -62,6 +62,8 @@ def certify(
     turns, rounds,
 ):  # fmt: skip
     """Certified kappa of every piece and kind; and the smallest uniform stretch that keeps limits.
+
+    Both in one kernel: the second needs all of the first, which would be compiled twice.
 
     coefficients (K, N+1, 3), times (K,), limits as `Limits.as_array`; tables: of
     `lookup_tables`; upper and lower (K, kinds) get the bound and, but for rounding, a value that
@@ -209,9 +211,13 @@ def _range(
     kind, coefficients, piece, time, gravity, tables, tolerance, points, numerators, denominators,
     ends, turns,
 ):  # fmt: skip
-    """Bounds of the largest value of what a kind is about, from below and above, and where."""
+    """Bounds of the largest value of what a kind is about, from below and above, and where.
+
+    A kind that is left out, for want of its workspace, has no bound.
+    """
     if turns is None:
-        pass
+        if kind >= TURNING:
+            return np.inf, np.inf, 0.0
     elif kind >= TURNING:
         return largest_turn(
             KIND_ORDERS[kind], coefficients, piece, time, gravity, tables, tolerance, points, turns,
@@ -226,7 +232,8 @@ def _range(
     if not error < np.inf:  # overflow, or not a number
         return np.inf, np.inf, 0.0
     if denominators is None:
-        pass
+        if kind in (4, 5):
+            return np.inf, np.inf, 0.0
     elif kind in (4, 5):
         if not _quotient(kind, points, degree, error, tables[1], numerators, denominators, ends):
             return np.inf, np.inf, 0.0

@@ -91,7 +91,8 @@ class Settings:
     time_limit: float | None = None
     """s, after which the best plan so far is returned; None for no limit."""
     tolerance: float = 1e-4
-    """Relative: of the gap, the stretch and the decrement at which the problem counts as solved."""
+    """Relative: of the gap, the stretch and the decrement at which the problem counts as solved; of
+    the stretch up to ten times as much where nothing more is gained."""
     idle_tolerance: float = 1.2e-3
     """Part of the flight during which no limit may be at work, before legs are cut for it."""
     iterations: int = 150
