@@ -32,7 +32,8 @@ from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE
 
 kernels = pytest.mark.kernels
 
-NAMES = [kind.name for kind in KINDS]
+NAMES = [kind.name for kind in KINDS[: bounds.ROTORS]]
+"""Rotor thrusts are in `test_rotors.py`."""
 ORDERS = {kind.name: kind.order for kind in KINDS}
 CLOSE = 1e-9
 """How far above an attained value a bound of kappa may be, relative."""
@@ -46,14 +47,15 @@ CAP = 1e9
 
 def kernel_bounds(coefficients, times, limits):
     """Upper bound and attained value (K, kinds) of kappa, and where (normalised time)."""
-    shape = (len(times), len(KINDS))
+    shape = (len(times), len(NAMES))
     upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
     degree = coefficients.shape[1] - 1
     tables, limits = bounds.lookup_tables(degree), np.array(limits)
     bounds.certify(
         coefficients, np.array(times), limits, GRAVITY, tables, TOLERANCE, upper, lower, place,
         bounds.quotients_workspace(degree) if np.isfinite(limits[4:6]).any() else None,
-        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None, 1,
+        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None,
+        None, 1,
     )  # fmt: skip
     return upper, lower, place
 
@@ -420,7 +422,7 @@ def test_bounds_of_a_few_pieces(shape):
 def test_kinds_that_are_not_limited_are_not_judged():
     piece = np.random.default_rng(0).normal(size=(1, 6, 3))
     for chosen in (("speed", "snap"), ("snap", "body_rate"), ("angular_acceleration",)):
-        expected = [kind.name in chosen for kind in KINDS]
+        expected = [name in chosen for name in NAMES]
         upper, lower, _ = kernel_bounds(piece, [1.0], np.where(expected, 2.0, math.nan))
         np.testing.assert_array_equal(np.isfinite(upper[0]), expected)
         np.testing.assert_array_equal(np.isfinite(lower[0]), expected)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
-from peakflight.kernels import bernstein, bounds, joints, turning
+from peakflight.kernels import bernstein, bounds, joints, rotors, turning
 from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
@@ -189,6 +189,7 @@ def _arguments(
         np.empty_like(upper),
         bounds.quotients_workspace(degree) if limits.on_leaning else None,
         turning.workspace(degree) if limits.on_turning else None,
+        None if limits.reach is None else rotors.workspace(degree, limits.reach),
     )
 
 
@@ -238,8 +239,11 @@ def _exceeded(peaks: dict[str, np.ndarray], limits: Limits) -> list[str]:
         kappa = peaks[kind.name]
         if not kappa.max() <= 1.0:  # NaN counts as exceeded
             segment = int(np.argmax(kappa))
-            lines.append(
-                f"{kind.label} reaches {kappa[segment]:.6g} times its limit of "
-                f"{getattr(limits, kind.name):g} {kind.unit} in segment {segment}"
-            )
+            reached = limits.attained(kind, float(kappa[segment]))
+            if kind.name == "least_rotor_thrust" and reached is not None:
+                how = f"falls to {reached:.6g} {kind.unit}, below its limit of"  # which may be 0
+            else:
+                how = f"reaches {kappa[segment]:.6g} times its limit of"
+            limit = getattr(limits, kind.name)
+            lines.append(f"{kind.label} {how} {limit:g} {kind.unit} in segment {segment}")
     return lines

@@ -13,7 +13,6 @@ from peakflight.cli.options import common_options, limits_option
 from peakflight.cli.output import (
     Printout,
     amount,
-    attained,
     number,
     print_json,
     ranges,
@@ -127,7 +126,7 @@ def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[st
         segment = int(kappa.argmax())
         worst[kind.name] = {
             "limit": getattr(limits, kind.name),
-            "reached": attained(kind, limits, float(kappa[segment])),
+            "reached": limits.attained(kind, float(kappa[segment])),
             "unit": kind.unit,
             "ratio": float(kappa[segment]),
             "segment": segment,
@@ -187,7 +186,7 @@ def _limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
     limits = plan.problem.limits
     for kind in limits.active:
         worst = float(report.peaks[kind.name].max())
-        reached = attained(kind, limits, worst)
+        reached = limits.attained(kind, worst)
         yield (
             kind.label,
             amount(kind, getattr(limits, kind.name)),

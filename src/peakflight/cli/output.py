@@ -8,13 +8,11 @@ from typing import Any
 
 import click
 
-from peakflight.limits import LimitKind, Limits
+from peakflight.limits import UNBOUNDED, LimitKind
 from peakflight.result import BINDING
 
 NARROWEST, WIDEST = 80, 100
 """Columns that output is laid out for, whatever the terminal has."""
-UNBOUNDED = 1e8
-"""Ratios from here on stand for no bound at all, as for least thrust in free fall."""
 STYLES = {"good": "bold green", "bad": "bold red", "title": "bold", "plain": ""}
 
 
@@ -95,16 +93,6 @@ def number(kind: LimitKind, value: float) -> str:
 def amount(kind: LimitKind, value: float) -> str:
     """Print a value of a kind of limit with its unit; angles in degrees."""
     return f"{number(kind, value)} {'deg' if kind.unit == 'rad' else kind.unit}"
-
-
-def attained(kind: LimitKind, limits: Limits, ratio: float) -> float | None:
-    """Value that a certified ratio stands for, in the unit of its kind; None where unbounded."""
-    limit: float = getattr(limits, kind.name)
-    if ratio >= UNBOUNDED:
-        return None
-    if kind.name.startswith("least_"):
-        return limit / ratio if ratio > 0.0 else None
-    return limit * ratio
 
 
 def ratio_cells(ratio: float) -> tuple[str, str, str]:

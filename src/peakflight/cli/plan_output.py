@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from peakflight.cli.options import written
-from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
+from peakflight.cli.output import Printout, amount, number, ratio_cells, seconds
 from peakflight.limits import LABELS
 from peakflight.result import Plan
 
@@ -114,7 +114,7 @@ def _worst(plan: Plan) -> Iterator[Sequence[str]]:
         kappa = plan.report.peaks[kind.name]
         segment = int(kappa.argmax())
         worst = float(kappa[segment])
-        reached = attained(kind, limits, worst)
+        reached = limits.attained(kind, worst)
         yield (
             kind.label,
             amount(kind, getattr(limits, kind.name)),

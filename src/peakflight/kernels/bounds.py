@@ -9,8 +9,8 @@ bounded beforehand and added to the control points, so that the bound holds for 
 is written in the file, in exact arithmetic.
 
 A new kind of limit is one branch in `_quotient` and one in `_ratio`, or, where that is not enough,
-in `_range`: kinds from TURNING on are about several derivatives at once (`kernels.turning`). Kinds
-are numbered as in `limits.KINDS`.
+in `_range`: kinds from TURNING on are about several derivatives at once (`kernels.turning`), those
+from ROTORS on about sums of norms (`kernels.rotors`). Kinds are numbered as in `limits.KINDS`.
 """
 
 import numpy as np
@@ -22,12 +22,15 @@ from peakflight.kernels.bernstein import (
     falling_factorials,
 )
 from peakflight.kernels.jit import inner, kernel, within
+from peakflight.kernels.rotors import largest_demand
 from peakflight.kernels.turning import binomials, largest_turn, required_stretch
 
-KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4])
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4, 4, 4])
 """The highest derivative that each kind is about."""
 TURNING = 6
 """Kinds from here on are about how the thrust direction turns."""
+ROTORS = 8
+"""Kinds from here on are about rotor thrusts: this one from above, the other from below."""
 DEPTH = 24
 """Intervals that wait at any one time; beyond, the hull of an interval is taken as it is."""
 NESTING = 40
@@ -59,7 +62,7 @@ def quotients_workspace(degree: int) -> np.ndarray:
 @kernel
 def certify(
     coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
-    turns, rounds,
+    turns, rotors, rounds,
 ):  # fmt: skip
     """Certified kappa of every piece and kind; and the smallest uniform stretch that keeps limits.
 
@@ -67,8 +70,8 @@ def certify(
     `lookup_tables`; upper and lower (K, kinds) get the bound and, but for rounding, a value that
     is attained (NaN for kinds that are not limited), place (K, kinds) where, in normalised time.
     denominators: `quotients_workspace`, or None where neither tilt nor least thrust is limited;
-    turns: `turning.workspace`, or None where no kind from TURNING on is. It is compiled without
-    them then.
+    turns: `turning.workspace`, or None where no kind from TURNING to ROTORS is; rotors:
+    `rotors.workspace`, or None where none from there on is. It is compiled without them then.
 
     With rounds = 1 that is all. With more, up to ROUNDS, a trajectory is then scaled until it just
     keeps every limit, certified: coefficients and times are replaced, and the stretch is returned,
@@ -82,7 +85,7 @@ def certify(
     for _ in range(rounds):
         _bound(
             coefficients, times, limits, gravity, tables, tolerance, upper, lower, place,
-            denominators, turns,
+            denominators, turns, rotors,
         )  # fmt: skip
         if rounds == 1:
             return factor
@@ -97,8 +100,17 @@ def certify(
                     needed = max(
                         needed,
                         _needed(
-                            kind, coefficients, k, times[k], at, limits, gravity, tables[2], turns
-                        ),
+                            kind,
+                            coefficients,
+                            k,
+                            times[k],
+                            at,
+                            limits,
+                            gravity,
+                            tables[2],
+                            turns,
+                            rotors,
+                        ),  # fmt: skip
                     )
         if feasible:
             best = min(best, factor)
@@ -131,7 +143,7 @@ def certify(
 @within
 def _bound(
     coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
-    turns,
+    turns, rotors,
 ):  # fmt: skip
     """One round of `certify`."""
     degree = coefficients.shape[1] - 1
@@ -146,8 +158,8 @@ def _bound(
             if not limits[kind] > 0.0:
                 continue
             low, high, place[k, kind] = _range(
-                kind, coefficients, k, times[k], gravity, tables, tolerance, points, numerators,
-                denominators, ends, turns,
+                kind, limits[kind], coefficients, k, times[k], gravity, tables, tolerance, points,
+                numerators, denominators, ends, turns, rotors,
             )  # fmt: skip
             upper[k, kind] = _ratio(kind, high, limits[kind], True)
             lower[k, kind] = _ratio(kind, low, limits[kind], False)
@@ -165,15 +177,23 @@ def _rescale(coefficients, times, factor, scaled_coefficients, scaled_times):
 
 
 @inner
-def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials, turns):
+def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials, turns, rotors):
     """Uniform stretch that one kind asks for at one point of a piece."""
     order = KIND_ORDERS[kind]
+    if rotors is None:
+        pass
+    elif kind >= ROTORS:
+        return required_stretch(
+            order, _sign(kind), rotors[3][0], coefficients, piece, time, place, limits[kind],
+            gravity, factorials, rotors[2],
+        )  # fmt: skip
     if turns is None:
         pass
     elif kind >= TURNING:
         return required_stretch(
-            order, coefficients, piece, time, place, limits[kind], gravity, factorials, turns[2]
-        )
+            order, 0.0, 0.0, coefficients, piece, time, place, limits[kind], gravity, factorials,
+            turns[2],
+        )  # fmt: skip
     x = 0.0
     y = 0.0
     z = 0.0
@@ -206,10 +226,20 @@ def _required_stretch(kind, x, y, z, limit, gravity):
 
 @inner
 def _range(
-    kind, coefficients, piece, time, gravity, tables, tolerance, points, numerators, denominators,
-    ends, turns,
+    kind, limit, coefficients, piece, time, gravity, tables, tolerance, points, numerators,
+    denominators, ends, turns, rotors,
 ):  # fmt: skip
-    """Bounds of the largest value of what a kind is about, from below and above, and where."""
+    """Bounds of the largest value of what a kind is about, from below and above, and where.
+
+    Of its square, if not of rotors.
+    """
+    if rotors is None:
+        pass
+    elif kind >= ROTORS:
+        return largest_demand(
+            _sign(kind), limit, coefficients, piece, time, gravity, tables, tolerance, points,
+            rotors, ends,
+        )  # fmt: skip
     if turns is None:
         pass
     elif kind >= TURNING:
@@ -233,6 +263,12 @@ def _range(
         return _largest(numerators, denominators, 2 * degree, tolerance, ends)
     _square(points, 0, degree, error, tables[1], 1.0, numerators)
     return _largest(numerators, None, 2 * degree, tolerance, ends)
+
+
+@inner
+def _sign(kind):
+    """How the size of F enters what a kind of ROTORS is about."""
+    return 1.0 if kind == ROTORS else -1.0
 
 
 @inner
@@ -261,9 +297,9 @@ def _quotient(kind, points, degree, error, product, numerators, denominators, en
 
 @inner
 def _ratio(kind, value, limit, is_bound):
-    """Kappa from the value that `_quotient` is about; a bound is rounded up."""
+    """Kappa from the value that `_range` is about; a bound is rounded up."""
     slack = 1.0 + 4.0 * EPSILON if is_bound else 1.0
-    root = np.sqrt(max(value, 0.0)) * slack
+    root = value if kind >= ROTORS else np.sqrt(max(value, 0.0)) * slack
     if kind == 4:
         ratio = np.arctan(root) * slack / limit if value < np.inf else np.pi / limit
     elif kind == 5:
