@@ -15,9 +15,9 @@ import numpy as np
 from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
-from peakflight.kernels.conditions import Layout
+from peakflight.kernels.conditions import LEAST, Layout
 from peakflight.kernels.interior import Begin
-from peakflight.limits import GRAVITY, KINDS
+from peakflight.limits import GRAVITY
 from peakflight.methods import (
     Outcome,
     limit_kernels,
@@ -330,7 +330,9 @@ def _run(
     grid = unknowns.make_grid(class_.degree, SAMPLES if whole else SAMPLES_OF_MANY)
     limits = problem.limits.as_array() if limits is None else limits
     free = problem.is_at_rest and task.effort is None
-    limited = unknowns.make_limited(limits, task.effort, GRAVITY, 0.0 if free else 1.0)
+    limited = unknowns.make_limited(
+        limits, task.effort, GRAVITY, 0.0 if free else 1.0, problem.limits.reach
+    )
     work = unknowns.make_work(layout, grid, limited)
     unknowns.set_unknowns(layout, start.data, start.starts, start.times, work.x)
     if start.dual is not None and start.dual.shape == work.dual.shape:
@@ -441,8 +443,8 @@ def _excess(task: _Task, trajectory: Trajectory) -> np.ndarray:
 
 
 def _lowered(limits: np.ndarray, excess: np.ndarray) -> np.ndarray:
-    """Limits (len(KINDS),) lowered, or raised where they hold from below, by an excess."""
-    from_below = np.array([kind.name.startswith("least_") for kind in KINDS])
+    """What kernels hold kinds to (len(KINDS),), lowered by an excess; raised where from below."""
+    from_below = np.arange(len(limits)) == LEAST
     return np.where(from_below, limits / (1.0 - excess), limits * (1.0 - excess))
 
 
