@@ -110,7 +110,7 @@ def certify(
                             tables[2],
                             turns,
                             rotors,
-                        ),  # fmt: skip
+                        ),
                     )
         if feasible:
             best = min(best, factor)
