@@ -149,7 +149,7 @@ def _bound(
     degree = coefficients.shape[1] - 1
     points = np.empty((degree + 1, 3))
     numerators = np.empty((DEPTH + 3, 2 * degree + 1))
-    ends = np.empty((DEPTH + 3, 3))
+    ends = np.empty((DEPTH + 3, 4))
     for k in range(times.size):
         for kind in range(limits.size):
             upper[k, kind] = np.nan

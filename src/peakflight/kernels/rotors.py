@@ -23,6 +23,9 @@ from peakflight.kernels.turning import DEPTH, NESTING, motion_at, split
 
 SPLITS = 2000
 """Subdivisions of one piece; beyond, the bound of an interval is taken as it is."""
+ROUGHEST, FALL = 1e-7, 0.5
+"""A gap that a subdivision did not lower to the second part of what it was is rounding, if it is
+below the first part of the limit: it stays."""
 GLIMPSES = 12
 """Even intervals of a piece at whose ends is looked first, for a value near the maximum."""
 REFINEMENTS, LOOKS, CLOSER = 6, 3, 0.3
@@ -47,7 +50,7 @@ def largest_demand(
     """Bounds of the largest |F| + c |alpha| (sign 1) or g - |F| + c |alpha| (-1) over a piece.
 
     Closed to a tolerance that is relative to the limit, or to the value if that is larger. tables:
-    as in `bounds`; points (n+1, 3), rotors (`workspace`) and ends (depth, 3) are scratch. Returns
+    as in `bounds`; points (n+1, 3), rotors (`workspace`) and ends (depth, 4) are scratch. Returns
     an attained value (but for rounding), at least 0, an upper bound, and where.
     """
     stack, lines, motion, reach = rotors
@@ -71,13 +74,20 @@ def largest_demand(
     ends[0, 0] = 0.0
     ends[0, 1] = 1.0
     ends[0, 2] = 0.0
+    ends[0, 3] = np.inf
     while waiting > 0:
         waiting -= 1
         nesting = ends[waiting, 2]
         _draw(stack, waiting, degree, errors, sizes, nesting, lines)
         bound = _bound(sign, lines, reach[0], gravity)
+        size = max(low, limit)
+        gap = bound - max(
+            _demand(sign, stack[waiting, 0], reach[0], gravity, 0.0),
+            _demand(sign, stack[waiting, degree], reach[0], gravity, 0.0),
+        )
         if (
-            bound <= low + tolerance * max(low, limit)
+            bound <= low + tolerance * size
+            or (gap <= ROUGHEST * size and gap > FALL * ends[waiting, 3])
             or waiting >= DEPTH
             or splits >= SPLITS
             or nesting >= NESTING
@@ -93,6 +103,8 @@ def largest_demand(
         ends[waiting, 0] = middle
         ends[waiting, 2] = nesting + 1.0
         ends[waiting + 1, 2] = nesting + 1.0
+        ends[waiting, 3] = gap
+        ends[waiting + 1, 3] = gap
         value = _demand(sign, stack[waiting, 0], reach[0], gravity, 0.0)
         if low < value < np.inf:
             low = value
@@ -159,8 +171,8 @@ def _draw(stack, row, degree, errors, sizes, nesting, lines):
             below = min(below, off)
             above = max(above, off)
         vector = c // 3
-        # each subdivision rounds `degree` times, by less than 2 EPSILON of the size
-        lost = errors[vector] + (2.0 * degree * nesting + 16.0) * EPSILON * sizes[vector]
+        # each subdivision rounds `degree` sums, by half an EPSILON of the size
+        lost = errors[vector] + (degree * nesting + 16.0) * EPSILON * sizes[vector]
         lines[c, 0] = 0.5 * (first + last) + 0.5 * (below + above)
         lines[c, 1] = 0.5 * (last - first)
         lines[c, 2] = 0.5 * (above - below) + lost
