@@ -338,7 +338,7 @@ def _run(
     if start.dual is not None and start.dual.shape == work.dual.shape:
         work.dual[:] = start.dual
     tolerance = settings.tolerance if tolerance is None else tolerance
-    if not problem.is_at_rest and begin in (GOING_ON, AGAIN):
+    if not _eases(problem) and begin in (GOING_ON, AGAIN):
         begin = begin._replace(margin=0.0, slack=WARM.slack)
     at_once = settings.iterations if math.isinf(task.deadline) else CHUNK
     code, left, anew = interior.LIMIT, settings.iterations, True
@@ -375,6 +375,14 @@ def _run(
         int(work.marks[interior.COUNT]),
         work.dual,
     )
+
+
+def _eases(problem: Problem) -> bool:
+    """Whether a little slower is a little easier, so that runs go on from a stretch.
+
+    It is not with motion that is fixed, nor for rotors: a stretch turns F.
+    """
+    return problem.is_at_rest and problem.limits.reach is None
 
 
 def _is_sound(layout: Layout, x: np.ndarray) -> bool:
