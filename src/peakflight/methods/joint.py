@@ -54,6 +54,8 @@ TIGHTENINGS = 8
 """Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
 NARROWINGS, NARROW = 4, 2e-3
 """Rounds of the same, where peaks between samples would cost more than this part of the time."""
+BEYOND = 1e-5
+"""Part of a limit by which it is lowered further then, where it is about rotors."""
 HOPELESS = 0.2
 """Excess over a limit that lowering limits is not tried for."""
 ROUNDS = 3
@@ -397,18 +399,24 @@ def _is_sound(layout: Layout, x: np.ndarray) -> bool:
 
 def _finished(task: _Task, runs: list[_Run]) -> Outcome:
     """The best run, made feasible exactly."""
+    best: Outcome | None = None
     for run in sorted(runs, key=lambda run: run.objective):
         if task.problem.is_at_rest:
             found, last = _stretched(task, run)
         else:
             found, last = _tightened(task, run)
-        if found is not None:
-            return Outcome(
+        if found is not None and (best is None or found.duration < best.trajectory.duration):
+            best = Outcome(
                 status=_status(task, last),
                 trajectory=found,
                 pieces=tuple(run.pieces.tolist()),
                 memory=last.dual,
             )
+        missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
+        if best is not None and (_eases(task.problem) or task.is_late or not missed):
+            break
+    if best is not None:
+        return best
     return Outcome(
         status=Status.INFEASIBLE,
         trajectory=runs[-1].trajectory,
@@ -422,12 +430,13 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
     """The exact uniform stretch; with effort, only where limits are exceeded.
 
     Where it costs more than samples told, limits are lowered and the problem is solved again: a
-    narrow peak between samples need not slow down the whole flight.
+    narrow peak between samples need not slow down the whole flight. For rotors there may be no
+    stretch that is worth having; then limits are lowered until the motion keeps them as it is.
     """
-    limits = task.problem.limits
+    limits, eases = task.problem.limits, _eases(task.problem)
     lowered = limits.as_array()
     best, answer = None, run
-    for _ in range(NARROWINGS):
+    for _ in range(NARROWINGS if eases else TIGHTENINGS):
         found: Trajectory | None = run.trajectory
         if task.effort is None or _excess(task, run.trajectory).any():
             stretched = stretch_to_limits(run.trajectory, limits)
@@ -437,8 +446,11 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
         if task.is_late or not missed:
             break
-        lowered = _lowered(lowered, np.fmin(_excess(task, run.trajectory), HOPELESS))
-        run = _from(task, run, GOING_ON, lowered)
+        excess = _excess(task, run.trajectory)
+        if not eases:
+            excess = np.where(excess > 0.0, 2.0 * excess + BEYOND, 0.0)
+        lowered = _lowered(lowered, np.fmin(excess, HOPELESS))
+        run = _from(task, run, GOING_ON if eases else WARM, lowered)
     if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
         answer = replace(answer, solved=False)
     return best, answer
