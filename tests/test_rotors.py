@@ -1,9 +1,12 @@
 """Rotor thrusts: bounds that hold in exact arithmetic, the stretch, and plans that keep them."""
 
+import json
 import math
+from dataclasses import replace
 from decimal import Decimal, getcontext
 from fractions import Fraction
 from math import perm
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,13 +17,19 @@ from peakflight import (
     KINDS,
     Airframe,
     Limits,
+    Plan,
+    Status,
     Trajectory,
     certify,
+    certify_plan,
+    plan,
+    read_course,
     stretch_to_limits,
 )
 from peakflight.certificate import TOLERANCE, peak_ratios
 from peakflight.kernels import bounds, rotors
 from peakflight.limits import ROTORS, limited_values
+from peakflight.methods import METHODS
 
 kernels = pytest.mark.kernels
 
@@ -177,3 +186,109 @@ def test_stretch_is_certified_and_nothing_a_little_faster_is(limits, too_slow, p
     assert not certify(found.stretch(1.0 - 1e-6), limits).feasible
     worst = np.nanmax(peak_ratios(found, limits))
     assert worst <= 1.0
+
+
+# ---- plans ------------------------------------------------------------------------------------
+
+COURSES = Path(__file__).parents[1] / "examples" / "courses"
+RACING_RATE = replace(RACING, body_rate=15.0)
+
+
+def course(name):
+    return read_course(COURSES / f"{name}.json").waypoints
+
+
+def rotors_by_difference(trajectory, airframe, rate=10_000.0):
+    """(n, 4) thrusts of an X whose frame is carried along without twisting, and (n, 3) body rates.
+
+    From attitude matrices at `rate` Hz: the body rates are their logarithms, the torque follows
+    from differences of those and Euler's equations, and the mixer of the X does the rest.
+    """
+    times = np.arange(0.5 / rate, trajectory.duration, 1.0 / rate)
+    thrust = trajectory(trajectory.start_time + times, 2)
+    thrust[:, 2] += GRAVITY
+    size = np.linalg.norm(thrust, axis=1)
+    up = thrust / size[:, None]
+    frames = np.empty((len(times), 3, 3))
+    forward = np.array([1.0, 0.0, 0.0])
+    for i, axis in enumerate(up):
+        if i:  # the rotation along the great circle from one direction to the next
+            last = up[i - 1]
+            forward = forward - (forward @ axis) / (1.0 + last @ axis) * (last + axis)
+        forward = forward - (forward @ axis) * axis
+        forward /= np.linalg.norm(forward)
+        frames[i] = np.column_stack((forward, np.cross(axis, forward), axis))
+    steps = np.einsum("nji,njk->nik", frames[:-1], frames[1:])
+    turn = 0.5 * np.stack(
+        [steps[:, 2, 1] - steps[:, 1, 2], steps[:, 0, 2] - steps[:, 2, 0],
+         steps[:, 1, 0] - steps[:, 0, 1]], axis=1,
+    )  # fmt: skip
+    rates = turn * rate  # sines of angles of 1e-3 rad: good to 1e-7 of them
+    inertia = np.array([1.0, 1.0, 1.7]) * airframe.inertia
+    middle = 0.5 * (rates[1:] + rates[:-1])
+    torque = inertia * np.diff(rates, axis=0) * rate + np.cross(middle, inertia * middle)
+    by_roll, by_pitch = (torque[:, :2] / (4.0 * airframe.lever)).T
+    # the worst heading: the frame turned about its thrust axis
+    worst = np.hypot(by_roll, by_pitch) * math.sqrt(2.0)
+    share = airframe.mass * size[1:-1] / 4.0
+    signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+    thrusts = [share + x * by_roll + y * by_pitch for x, y in signs]
+    thrusts = np.stack([*thrusts, share + worst, share - worst])
+    return thrusts.T, rates, torque
+
+
+@pytest.mark.parametrize("name", ["tight_then_fast", "mfbo_traj_2"])
+def test_every_rotor_is_within_its_range_along_the_whole_flight(name):
+    made = plan(course(name), limits=RACING_RATE)
+    assert made.report.feasible
+    thrusts, rates, torque = rotors_by_difference(made.trajectory, RACER)
+    inner = slice(20, -20)  # snap jumps at joints and at both ends: differences smear that
+    # differences over 0.1 ms are good to 1e-3 of what changes within 0.1 s
+    assert thrusts[inner].max() <= RACING.rotor_thrust * 1.002
+    assert thrusts[inner].min() >= -0.002 * RACING.rotor_thrust
+    assert np.abs(rates[:, 2]).max() <= 1e-6 * np.abs(rates).max()
+    assert np.abs(torque[:, 2]).max() <= 1e-3 * np.abs(torque).max()
+    assert np.linalg.norm(rates, axis=1).max() <= 15.0 * 1.0001
+    # and they are used: the flight is at some limit all the time
+    assert thrusts.max() >= 0.99 * RACING.rotor_thrust
+
+
+def test_the_racing_course_is_as_fast_as_it_should_be():
+    made = plan(course("uzh_19wp"), limits=RACING_RATE)
+    assert (made.status, made.report.feasible) == (Status.SOLVED, True)
+    assert made.duration <= 18.36
+
+
+@pytest.mark.parametrize("name", ["mfbo_traj_2", "random_10"])
+def test_three_starts_end_alike_on_slow_courses_with_short_legs(name):
+    found = [
+        plan(course(name), limits=RACING_RATE, initial=initial)
+        for initial in ("guess", "proportional", "peak")
+    ]
+    assert all(made.report.feasible for made in found)
+    durations = [made.duration for made in found]
+    assert max(durations) <= 1.01 * min(durations)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("limits", [RACING, CRAZYFLIE])
+def test_every_method_keeps_rotor_limits(method, limits):
+    rng = np.random.default_rng(5)
+    waypoints = np.cumsum(rng.normal(size=(5, 3)), axis=0)
+    made = plan(waypoints, limits=limits, method=method)
+    assert made.report.feasible
+    derivatives = [made.trajectory.sample(2000, order) for order in range(1, 5)]
+    values = limited_values(derivatives, limits.airframe)
+    assert values["rotor_thrust"].max() <= limits.rotor_thrust * (1.0 + 1e-12)
+    assert values["least_rotor_thrust"].min() >= -1e-12
+    again = Plan.from_dict(json.loads(json.dumps(made.to_dict())))
+    assert again.problem.limits == limits
+    assert certify_plan(again).feasible
+
+
+def test_planning_for_rotors_beats_slowing_down():
+    waypoints = course("tight_then_fast")
+    slowed = plan(waypoints, limits=RACING_RATE, method="proportional").duration
+    spline = plan(waypoints, limits=RACING_RATE, method="peak").duration
+    joint = plan(waypoints, limits=RACING_RATE).duration
+    assert joint < spline < slowed

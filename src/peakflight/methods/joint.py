@@ -26,15 +26,14 @@ from peakflight.methods import (
     require,
     require_whole,
 )
+from peakflight.methods.classes import complete, without_class
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.methods.start import Start, guess, start_of
-from peakflight.problem import DEGREES, Problem, derivative_name
+from peakflight.problem import Problem
 from peakflight.result import History, Plan
 from peakflight.spline import coefficients_of
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
-DEGREE = 7
-"""Degree where the problem leaves it to the method."""
 STARTS = ("guess", "proportional", "peak")
 SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
@@ -164,9 +163,9 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     """The fastest trajectory of its class, or the least of time and effort, feasible."""
     limit = math.inf if settings.time_limit is None else settings.time_limit
     deadline = time.perf_counter() + limit
-    complete = _complete(problem)
-    task = _Task(complete, settings, _effort(complete, settings), deadline)
-    legs = len(complete.waypoints) - 1
+    completed = complete(problem)
+    task = _Task(completed, settings, _effort(completed, settings), deadline)
+    legs = len(completed.waypoints) - 1
     if settings.max_pieces is not None and settings.max_pieces < legs:
         raise InvalidProblem(
             f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
@@ -181,13 +180,13 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     runs = _runs(task, problem)
     iterations = sum(run.iterations for run in runs)
     outcome = replace(
-        _finished(task, runs), problem=complete, iterations=iterations, history=_history(runs)
+        _finished(task, runs), problem=completed, iterations=iterations, history=_history(runs)
     )
     infeasible = outcome.status is Status.INFEASIBLE
     doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
     if not (infeasible or (doubtful and task.effort is None)):
         return outcome
-    spline = _without_class(problem)
+    spline = without_class(problem)
     other = peak.solve(spline, peak.Settings())
     faster = other.trajectory.duration < (1.0 - TIE) * outcome.trajectory.duration
     if other.status is Status.INFEASIBLE or not (infeasible or faster):
@@ -199,45 +198,6 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         iterations=iterations + other.iterations,
         message=FELL_BACK,
     )
-
-
-def _complete(problem: Problem) -> Problem:
-    """The problem with degree and continuity filled in."""
-    highest = _highest(problem)
-    degree = problem.degree
-    if degree is None:
-        degree = min(max(DEGREE, 2 * highest + 1), DEGREES[-1])
-    most = basis.counts(degree)[1] - 1
-    if highest > most:
-        raise InvalidProblem(
-            f"{derivative_name(highest)} is fixed at a waypoint; method joint fixes up to "
-            f"{derivative_name(most)} at degree {degree}"
-        )
-    continuity = most if problem.continuity is None else problem.continuity
-    if continuity > most:
-        raise InvalidProblem(
-            f"continuity is {continuity}; method joint has up to {most} at degree {degree}"
-        )
-    if degree == problem.degree and continuity == problem.continuity:
-        return problem
-    return replace(problem, degree=degree, continuity=continuity)
-
-
-def _highest(problem: Problem) -> int:
-    """The highest derivative that is fixed at a waypoint; 0 if none is."""
-    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
-    return 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
-
-
-def _without_class(problem: Problem) -> Problem:
-    """The problem for a spline of the natural class, of a cost that leaves room for what is fixed.
-
-    The optimum for a cost on the r-th derivative holds derivatives up to the one before.
-    """
-    highest = _highest(problem)
-    if highest < problem.spline_class.cost_order:
-        return replace(problem, degree=None, continuity=None)
-    return replace(problem, minimize={highest + 1: 1.0}, degree=None, continuity=None)
 
 
 def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
@@ -507,7 +467,7 @@ def _given(task: _Task, problem: Problem) -> Start | None:
     if settings.initial == "guess":
         return None
     method = peak if settings.initial == "peak" else proportional
-    found = method.solve(_without_class(problem), method.Settings())
+    found = method.solve(without_class(problem), method.Settings())
     return start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
 
 
