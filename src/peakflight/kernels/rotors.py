@@ -78,8 +78,9 @@ def largest_demand(
     while waiting > 0:
         waiting -= 1
         nesting = ends[waiting, 2]
-        _draw(stack, waiting, degree, errors, sizes, nesting, lines)
-        bound = _bound(sign, lines, reach[0], gravity)
+        bound = np.inf
+        if _draw(stack, waiting, degree, errors, sizes, nesting, lines):
+            bound = _bound(sign, lines, reach[0], gravity)
         size = max(low, limit)
         gap = bound - max(
             _demand(sign, stack[waiting, 0], reach[0], gravity, 0.0),
@@ -159,7 +160,8 @@ def _demand(sign, point, reach, gravity, lift):
 def _draw(stack, row, degree, errors, sizes, nesting, lines):
     """Lines <- centre, slope and radius of each component of F, j, s and alpha on an interval.
 
-    The slope is by a variable from -1 to 1.
+    The slope is by a variable from -1 to 1. Returns whether there is thrust all along: without it
+    alpha is not drawn.
     """
     for c in range(9):
         first = stack[row, 0, c]
@@ -178,6 +180,8 @@ def _draw(stack, row, degree, errors, sizes, nesting, lines):
         lines[c, 2] = 0.5 * (above - below) + lost
     square = _dot(lines, 0, 0)
     inverse = _inverse(square)
+    if not inverse[2] < np.inf:
+        return False
     twice = _times(_dot(lines, 0, 3), inverse)
     twice = (-2.0 * twice[0], -2.0 * twice[1], 2.0 * twice[2])
     for d in range(3):  # s - 2 (F.j / F.F) j, in place of s
@@ -190,6 +194,7 @@ def _draw(stack, row, degree, errors, sizes, nesting, lines):
         other = _times(_line(lines, f), _line(lines, 6 + e))
         turn = _plus(one, (-other[0], -other[1], other[2]))
         _keep(lines, 9 + d, _times(turn, inverse))
+    return True
 
 
 @inner
