@@ -32,7 +32,8 @@ from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE
 
 kernels = pytest.mark.kernels
 
-NAMES = [kind.name for kind in KINDS]
+NAMES = [kind.name for kind in KINDS[: bounds.ROTORS]]
+"""Rotor thrusts are in `test_rotors.py`."""
 ORDERS = {kind.name: kind.order for kind in KINDS}
 CLOSE = 1e-9
 """How far above an attained value a bound of kappa may be, relative."""
@@ -46,25 +47,26 @@ CAP = 1e9
 
 def kernel_bounds(coefficients, times, limits):
     """Upper bound and attained value (K, kinds) of kappa, and where (normalised time)."""
-    shape = (len(times), len(KINDS))
+    shape = (len(times), len(NAMES))
     upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
     degree = coefficients.shape[1] - 1
     tables, limits = bounds.lookup_tables(degree), np.array(limits)
     bounds.certify(
         coefficients, np.array(times), limits, GRAVITY, tables, TOLERANCE, upper, lower, place,
         bounds.quotients_workspace(degree) if np.isfinite(limits[4:6]).any() else None,
-        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None, 1,
+        turning.workspace(degree) if np.isfinite(limits[bounds.TURNING :]).any() else None,
+        None, 1,
     )  # fmt: skip
     return upper, lower, place
 
 
 def test_a_kind_whose_workspace_is_left_out_has_no_bound():
     coefficients, times = np.zeros((1, 4, 3)), np.ones(1)
-    limits = np.array([5.0, np.nan, np.nan, np.nan, 1.5, 1.0, 3.0, 3.0])
+    limits = np.array([5.0, np.nan, np.nan, np.nan, 1.5, 1.0, 3.0, 3.0, 30.0, 1.0])
     upper, lower, place = (np.empty((1, len(KINDS))) for _ in range(3))
     bounds.certify(
         coefficients, times, limits, GRAVITY, bounds.lookup_tables(3), TOLERANCE, upper, lower,
-        place, None, None, 1,
+        place, None, None, None, 1,
     )  # fmt: skip
     assert upper[0, 0] <= 1e-9
     assert (upper[0, 4:] > 1.0).all(), "hovering keeps them all, but nothing has looked"
@@ -432,7 +434,7 @@ def test_bounds_of_a_few_pieces(shape):
 def test_kinds_that_are_not_limited_are_not_judged():
     piece = np.random.default_rng(0).normal(size=(1, 6, 3))
     for chosen in (("speed", "snap"), ("snap", "body_rate"), ("angular_acceleration",)):
-        expected = [kind.name in chosen for kind in KINDS]
+        expected = [name in chosen for name in NAMES]
         upper, lower, _ = kernel_bounds(piece, [1.0], np.where(expected, 2.0, math.nan))
         np.testing.assert_array_equal(np.isfinite(upper[0]), expected)
         np.testing.assert_array_equal(np.isfinite(lower[0]), expected)

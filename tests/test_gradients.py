@@ -9,7 +9,7 @@ import pytest
 from peakflight import spline
 from peakflight.kernels import barrier, basis, classical, general, measures
 from peakflight.kernels.jit import kernel
-from peakflight.limits import GRAVITY, KINDS
+from peakflight.limits import GRAVITY, KINDS, ROTORS
 from peakflight.problem import SplineClass, fixed_state
 from peakflight.spline import SplineTask
 
@@ -17,6 +17,8 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 NAMES = [kind.name for kind in KINDS]
+REACH = 0.05
+"""Of the airframe, m: turning counts as much as thrust in the samples below."""
 
 
 # ---- kernels --------------------------------------------------------------------------------
@@ -70,12 +72,16 @@ def call_watch(
 
 
 @kernel
-def call_measure(kind, samples, squares, count, row, limit, gravity, values, pulls):
-    measures.measure(kind, samples, squares, count, row, limit, gravity, values, pulls)
+def call_measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach):
+    measures.measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach)
 
 
-def is_turning(limits):
-    return bool(np.isfinite(limits[measures.TURNING :]).any())
+def workspace(count, degree, limits):
+    is_turning, is_rotors = (
+        bool(np.isfinite(limits[kinds]).any())
+        for kinds in (slice(measures.TURNING, measures.ROTORS), slice(measures.ROTORS, None))
+    )
+    return barrier.workspace(count, degree, is_turning, np.array([REACH]) if is_rotors else None)
 
 
 def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watched=None):
@@ -87,7 +93,7 @@ def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watche
     value = call_evaluate(
         task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
         basis.sample_tables(degree, samples), watched, doublings, reference,
-        barrier.workspace(count, degree, is_turning(limits)), gradient,
+        workspace(count, degree, limits), gradient,
     )  # fmt: skip
     return value, gradient
 
@@ -98,7 +104,7 @@ def watched_by(task, times, limits, *, doublings):
     call_watch(
         task.rows, task.waypoints, task.simple, task.layered, np.array(times), limits, GRAVITY,
         basis.sample_tables(degree, barrier.BATCH), doublings,
-        barrier.workspace(count, degree, is_turning(limits)), watched,
+        workspace(count, degree, limits), watched,
     )  # fmt: skip
     return watched
 
@@ -112,6 +118,7 @@ def measure(name, derivatives, limit):
     call_measure(
         kind, samples, (samples**2).sum(axis=0), count, KINDS[kind].order - 1, limit, GRAVITY,
         values, np.zeros(samples.shape) if kind >= measures.TURNING else None,
+        np.array([REACH]) if kind >= measures.ROTORS else None,
     )  # fmt: skip
     return values
 
@@ -251,6 +258,11 @@ def keeps(name, derivatives, limit):
         return limit / size
     if name == "tilt":
         return np.arctan2(np.linalg.norm(thrust[:, :2], axis=1), thrust[:, 2]) / limit
+    if name in ROTORS:  # room: what hovering leaves
+        turn = REACH * keeps("angular_acceleration", derivatives, 1.0)
+        if name == "rotor_thrust":
+            return (size + turn) / limit
+        return (GRAVITY - size + turn) / limit
     if name in TURNS:  # derivatives of the unit vector n = F / |F|
         size, n = size[:, None], thrust / size[:, None]
         grows = (n * j).sum(axis=1, keepdims=True)
@@ -273,6 +285,8 @@ LIMITS = {
     "least_thrust_acceleration": 4.0,
     "body_rate": 8.0,
     "angular_acceleration": 80.0,
+    "rotor_thrust": 20.0,
+    "least_rotor_thrust": 9.0,
 }
 
 
@@ -293,15 +307,16 @@ def test_a_measure_is_at_most_one_exactly_where_the_limit_is_kept(name):
     assert (values >= 0.0).all()
     # tilt is smoothed by SOFTNESS, which moves its border by a part of 2.5e-7 of gravity; GUARD
     # moves what turning is by the square of GUARD g over the thrust, where the thrust is small
-    clear = np.abs(ratio - 1.0) > (1e-5 if name in ("tilt", *TURNS) else 1e-12)
-    if name in TURNS:
+    rounded = 0.01 if name in ROTORS else 1e-5 if name in ("tilt", *TURNS) else 1e-12
+    clear = np.abs(ratio - 1.0) > rounded  # EASE of rotors
+    if name in (*TURNS, *ROTORS):
         clear &= np.linalg.norm(derivatives[1] + [0.0, 0.0, GRAVITY], axis=1) > 4.0
     np.testing.assert_array_equal(values[clear] <= 1.0, ratio[clear] <= 1.0)
     assert 500 < (ratio <= 1.0).sum() < 4500
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in NAMES if not (name.startswith("least") or name in TURNS)]
+    "name", [name for name in NAMES if not (name.startswith("least") or name in (*TURNS, *ROTORS))]
 )
 def test_root_of_a_measure_is_the_uniform_stretch_that_is_needed(name):
     rng = np.random.default_rng(1)
@@ -361,6 +376,10 @@ def limits_for(names, derivatives, stretch):
             continue
         slowed = derivatives / stretch**kind.order
         ratio = 1.0
+        if kind.name in ROTORS:  # no limit at or below gravity
+            limits[index] = np.nanmax(keeps(kind.name, slowed, 1.0))
+            limits[index] = max(limits[index], 1.2 * GRAVITY if kind.name == ROTORS[0] else 1.0)
+            continue
         if kind.name.startswith("least") or kind.name in TURNS:  # m is a ratio squared
             slowed, ratio = derivatives, stretch ** (measures.EXPONENTS[index] / 2)
         unit = np.nanmax(keeps(kind.name, slowed, 1.0))

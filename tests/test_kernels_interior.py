@@ -6,6 +6,7 @@ Everything that calls a kernel by hand stands first, in a few helpers.
 import numpy as np
 import pytest
 
+from peakflight.airframe import Airframe
 from peakflight.kernels import band, basis, conditions, interior, pieces, rows, unknowns
 from peakflight.kernels.jit import kernel
 from peakflight.limits import GRAVITY, KINDS, limited_values
@@ -16,8 +17,11 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 LEANING = TURNING = np.ones(1)
-NAMES = (*[kind.name for kind in KINDS[:6]], "body_rate", "angular_acceleration")
-LIMITS = np.array([5.0, 15.5, 62.0, 800.0, 0.7, 8.0, 3.0, 25.0])
+AIRFRAME = Airframe(mass=0.85, inertia=1e-2, lever=0.106)
+"""Its reach makes turning count as much as thrust in the samples below."""
+REACH = np.array([AIRFRAME.reach])
+NAMES = tuple(kind.name for kind in KINDS)
+LIMITS = np.array([5.0, 15.5, 62.0, 800.0, 0.7, 8.0, 3.0, 25.0, 22.0, 8.0])
 """One for each kind; thrust in the samples below is around gravity."""
 GRAVITY_OF_SAMPLES = np.zeros((3, 4, 1))
 GRAVITY_OF_SAMPLES[2, 1] = GRAVITY
@@ -29,16 +33,17 @@ every_kind = pytest.mark.parametrize("kind", range(len(rows.KIND_TERMS)), ids=NA
 
 @kernel
 def call_constrain(
-    kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes, bends
 ):  # fmt: skip
     return rows.constrain(
-        kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
-    )
+        kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes,
+        bends,
+    )  # fmt: skip
 
 
 @kernel
-def call_kappa(kind, leaning, turning, samples, count, limit, gravity, out):
-    rows.kappa(kind, leaning, turning, samples, count, limit, gravity, out)
+def call_kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out):
+    rows.kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out)
 
 
 @kernel
@@ -104,7 +109,7 @@ def constrain(kind, samples, limits):
     slopes, bends = np.full((terms + 2, 3, count), NAN), np.full((terms + 2, count), NAN)
     limits = np.broadcast_to(limits, count).copy()
     stretch = call_constrain(
-        kind, LEANING, TURNING, samples, count, limits, GRAVITY, values, 1, slopes, bends
+        kind, LEANING, TURNING, REACH, samples, count, limits, GRAVITY, values, 1, slopes, bends
     )
     for array in (slopes, bends):
         assert np.isnan(array[0]).all()
@@ -114,7 +119,7 @@ def constrain(kind, samples, limits):
 
 def kappa(kind, samples, limit):
     out = np.full(samples.shape[2], NAN)
-    call_kappa(kind, LEANING, TURNING, samples, samples.shape[2], limit, GRAVITY, out)
+    call_kappa(kind, LEANING, TURNING, REACH, samples, samples.shape[2], limit, GRAVITY, out)
     return out
 
 
@@ -154,7 +159,16 @@ def plain_values(kind, samples):
     if kind == 6:
         return np.linalg.norm(np.cross(thrust, j), axis=1) / square
     turn = (thrust * j).sum(axis=1) / square
-    return np.linalg.norm(np.cross(thrust, s - 2.0 * turn[:, None] * j), axis=1) / square
+    swing = np.linalg.norm(np.cross(thrust, s - 2.0 * turn[:, None] * j), axis=1) / square
+    if kind == 7:
+        return swing
+    rest, sign = (0.0, 1.0) if kind == 8 else (GRAVITY, -1.0)
+    return rest + sign * np.sqrt(square) + AIRFRAME.reach * swing
+
+
+def ratio_of(kind, values, limit):
+    """Peak over limit: of the least rotor thrust, the values are how far it is below hovering."""
+    return limit / values if kind == 5 else values / limit
 
 
 # ---- rows: one kind of limit at samples -------------------------------------------------------
@@ -166,7 +180,7 @@ def test_a_row_is_at_most_zero_exactly_where_the_limit_is_kept(kind):
     limit = LIMITS[kind]
     values, _, _, _ = constrain(kind, samples, limit)
     found = plain_values(kind, samples)
-    ratio = limit / found if NAMES[kind].startswith("least") else found / limit
+    ratio = ratio_of(kind, found, limit)
     assert np.isfinite(values).all()
     assert 100 < (ratio <= 1.0).sum() < 1100
     if kind == 4:  # rounded by ROUNDNESS, to the safe side
@@ -174,6 +188,11 @@ def test_a_row_is_at_most_zero_exactly_where_the_limit_is_kept(kind):
         surely = (across + rows.ROUNDNESS * GRAVITY) / np.tan(limit) <= samples[2, 1]
         assert (values[surely] <= 0.0).all()
         assert (ratio[values <= 0.0] <= 1.0).all()
+        assert (surely != (ratio <= 1.0)).sum() < 50
+    elif kind > 7:  # likewise
+        surely = (found + rows.ROUNDNESS * GRAVITY) / limit <= 1.0
+        assert (values[surely] <= 0.0).all()
+        assert (ratio[values <= 0.0] <= 1.0 + 1e-6).all()
         assert (surely != (ratio <= 1.0)).sum() < 50
     else:  # WEIGHTLESS is a part of 1e-8 g^2 / |F|^2 of kinds that turn
         clear = np.abs(ratio - 1.0) > 1e-6
@@ -239,7 +258,7 @@ def test_bends_are_the_largest_curvature_of_rows(kind, scale):
         assert max(largest, 0.0) == pytest.approx(bends[0, q], rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", [6, 7], ids=NAMES[6:])
+@pytest.mark.parametrize("kind", range(6, 10), ids=NAMES[6:])
 def test_bends_of_kinds_that_turn_are_positive(kind):
     for scale in (0.1, 1.0, 3.0):
         bends = constrain(kind, random_samples(200, 5, scale), LIMITS[kind])[2]
@@ -251,12 +270,15 @@ def test_kappa_is_peak_over_limit(kind):
     samples = random_samples(300, 6, 1.5)
     found = plain_values(kind, samples)
     limit = LIMITS[kind]
-    expected = limit / found if NAMES[kind].startswith("least") else found / limit
+    expected = ratio_of(kind, found, limit)
     error = np.abs(kappa(kind, samples, limit) ** 2 - expected**2)
     tolerance = 1e-12 * expected**2
     if kind > 5:  # WEIGHTLESS leaves a part of what should cancel
         force, jerk, snap = np.sqrt((samples[:, 1:] ** 2).sum(axis=0))
         whole = jerk if kind == 6 else snap + 2.0 * jerk**2 / force
+        if kind > 7:
+            whole = AIRFRAME.reach * whole + GRAVITY
+            tolerance += rows.WEIGHTLESS * (1.0 + (GRAVITY / force) ** 2 * whole / limit) ** 2
         tolerance += 4.0 * rows.WEIGHTLESS * (GRAVITY / force * whole / force / limit) ** 2
     assert (error <= tolerance).all()
 
@@ -674,7 +696,8 @@ class Case:
         self.grid = unknowns.make_grid(LAYOUTS[name]["degree"], samples)
         limits = np.full(len(LIMITS), NAN)
         limits[list(kinds)] = LIMITS[list(kinds)]
-        self.limited = unknowns.make_limited(limits, effort, GRAVITY)
+        reach = REACH if np.isfinite(limits[rows.ROTORS :]).any() else None
+        self.limited = unknowns.make_limited(limits, effort, GRAVITY, reach=reach)
         self.work = unknowns.make_work(self.layout, self.grid, self.limited)
         self.rng = np.random.default_rng(seed)
         self.x = random_unknowns(self.layout, seed)
@@ -724,11 +747,11 @@ CASES = {
     "partly fixed": (("partly fixed", (0, 1, 2, 3)), {}),
     "body rate": (("degree 7, C3", (6,)), {}),
     "angular acceleration, free positions": (("degree 7, C3, pieces", (7,)), {}),
-    "all kinds": (("degree 7, C3, pieces", range(8)), {}),
+    "all kinds": (("degree 7, C3, pieces", range(len(KINDS))), {}),
     "effort": (("degree 7, C3", (0, 1, 2, 3)), {"effort": EFFORT}),
     "effort, free positions": (("partly fixed", (0, 1, 5)), {"effort": EFFORT}),
     "effort of jerk, degree 5": (("degree 5, C2", (2,)), {"effort": np.array([0, 0, 1e-3, 0])}),
-    "all kinds and effort": (("degree 6, C2", range(8)), {"effort": EFFORT}),
+    "all kinds and effort": (("degree 6, C2", range(len(KINDS))), {"effort": EFFORT}),
 }
 every_case = pytest.mark.parametrize("name", CASES)
 
@@ -840,6 +863,7 @@ def test_limits_are_lowered_by_what_happens_between_samples(slowly):
                     fit = np.polynomial.Polynomial.fit([-1, 0, 1], around[top - 1 : top + 2], 2)
                     peak = fit(fit.deriv().roots()[0])
                     inner += 1
+                peak = max(peak, 1e-300)  # of the least rotor thrust, it may be negative
                 ratio = min(max(there / peak, conditions.DEEPEST), 1.0)
                 wanted = case.limited.values[r] * (1.0 / ratio if kind == 5 else ratio)
                 part_way = before[k, r, q] + slowly * (wanted - before[k, r, q])

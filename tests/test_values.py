@@ -14,6 +14,7 @@ from scipy.interpolate import PPoly
 from peakflight import (
     GRAVITY,
     KINDS,
+    Airframe,
     History,
     InvalidFile,
     InvalidProblem,
@@ -24,7 +25,7 @@ from peakflight import (
     Status,
     Trajectory,
 )
-from peakflight.limits import keeps, limited_values
+from peakflight.limits import ROTORS, keeps, limited_values
 from peakflight.problem import SplineClass
 
 LIMITS = Limits(speed=5.0, thrust_acceleration=15.5)
@@ -93,10 +94,12 @@ def test_limits_are_frozen_floats_in_the_order_of_kinds():
     assert_frozen(limits)
     assert (type(limits.snap), type(limits.speed)) == (float, float)
     assert [kind.name for kind in limits.active] == ["speed", "snap", "tilt"]
-    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, NAN, NAN, NAN])
+    np.testing.assert_array_equal(limits.as_array(), [5.0, NAN, NAN, 800.0, 0.5, *[NAN] * 5])
     assert limits.to_dict() == {"speed": 5.0, "snap": 800.0, "tilt": 0.5}
     assert limits == Limits(speed=5.0, snap=800.0, tilt=0.5)
-    assert [field.name for field in dataclasses.fields(Limits)] == [kind.name for kind in KINDS]
+    assert [field.name for field in dataclasses.fields(Limits)][:-1] == [
+        kind.name for kind in KINDS
+    ]
 
 
 def test_unknown_limits_are_named():
@@ -105,15 +108,24 @@ def test_unknown_limits_are_named():
 
 
 positive = st.floats(1e-6, 1e9)
+AIRFRAME = Airframe(mass=0.85, inertia=1e-3, lever=0.106)
+HOVER = 0.85 * GRAVITY / 4.0
 LIMIT_VALUES = {
+    "rotor_thrust": st.floats(HOVER, 1e9, exclude_min=True),
+    "least_rotor_thrust": st.just(0.0) | st.floats(1e-6, HOVER, exclude_max=True),
     "thrust_acceleration": st.floats(GRAVITY, 1e9, exclude_min=True),
     "tilt": st.floats(1e-6, math.pi / 2, exclude_max=True),
     "least_thrust_acceleration": st.floats(1e-6, GRAVITY, exclude_max=True),
 }
-limits_strategy = st.fixed_dictionaries(
-    {"speed": positive},
-    optional={kind.name: LIMIT_VALUES.get(kind.name, positive) for kind in KINDS[1:]},
-).map(lambda values: Limits(**values))
+limits_strategy = (
+    st.fixed_dictionaries(
+        {"speed": positive},
+        optional={kind.name: LIMIT_VALUES.get(kind.name, positive) for kind in KINDS[1:]}
+        | {"airframe": st.just(AIRFRAME)},
+    )
+    .filter(lambda values: not set(values) & set(ROTORS) or "airframe" in values)
+    .map(lambda values: Limits(**values))
+)
 
 
 @settings(deadline=None, derandomize=True)
@@ -137,7 +149,7 @@ def test_limited_values_of_a_known_motion():
     x, y, z = 1.0, 2.0, 2.0 - 4.0 / GRAVITY
     first = np.linalg.norm([-y, x - z, y]) / (2.0 * GRAVITY)
     np.testing.assert_allclose(values["angular_acceleration"], [first, 2.0 / GRAVITY**2])
-    assert set(values) == {kind.name for kind in KINDS}
+    assert set(values) == {kind.name for kind in KINDS} - set(ROTORS)
     assert set(limited_values([velocity])) == {"speed"}
     assert "jerk" not in limited_values([velocity, acceleration])
     upside_down = limited_values([velocity, np.array([0.0, 0.0, -2 * GRAVITY])])
@@ -163,6 +175,78 @@ def test_turning_is_the_motion_of_the_thrust_direction():
         values = limited_values([np.zeros(3), thrust - [0.0, 0.0, GRAVITY], jerk, snap])
         assert values["body_rate"] == pytest.approx(speed)
         assert values["angular_acceleration"] == pytest.approx(change)
+
+
+def test_rotor_thrusts_are_what_the_worst_heading_needs():
+    """The mixer of an X, over headings: nothing outside, and both ends attained."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        v, a, j, s = rng.normal(size=(4, 3)) * np.array([5.0, 5.0, 50.0, 900.0])[:, None]
+        values = limited_values([v, a, j, s], AIRFRAME)
+        collective = AIRFRAME.mass * values["thrust_acceleration"]
+        torque = AIRFRAME.inertia * values["angular_acceleration"]
+        angle = np.linspace(0.0, 2.0 * np.pi, 2001)  # of the torque, seen from the body
+        by_roll, by_pitch = torque * np.cos(angle), torque * np.sin(angle)
+        rotors = np.array(
+            [collective / 4 + (y * by_roll + x * by_pitch) / (4 * AIRFRAME.lever)
+             for x, y in ((1, 1), (1, -1), (-1, 1), (-1, -1))]
+        )  # fmt: skip
+        assert values["rotor_thrust"] == pytest.approx(rotors.max(), rel=1e-6)
+        assert values["least_rotor_thrust"] == pytest.approx(rotors.min(), rel=1e-6, abs=1e-6)
+
+
+def test_kappa_of_rotor_thrust_and_the_value_it_stands_for():
+    limits = Limits(rotor_thrust=6.0, least_rotor_thrust=0.5, airframe=AIRFRAME, speed=2.0)
+    values = {"speed": 1.0, "rotor_thrust": 3.0, "least_rotor_thrust": np.array([0.5, 0.0, 9.0])}
+    ratios = limits.ratios(values)
+    assert ratios["rotor_thrust"] == 0.5
+    np.testing.assert_allclose(ratios["least_rotor_thrust"], [1.0, HOVER / (HOVER - 0.5), 0.0])
+    least = KINDS[[kind.name for kind in KINDS].index("least_rotor_thrust")]
+    assert limits.attained(least, float(ratios["least_rotor_thrust"][1])) == pytest.approx(0.0)
+    assert limits.attained(least, 1e9) is None
+    np.testing.assert_allclose(limits.as_array()[-2:], [24.0 / 0.85, GRAVITY - 2.0 / 0.85])
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"rotor_thrust": 6.0}, "limit rotor_thrust is set without an airframe"),
+        ({"least_rotor_thrust": 0.0}, "limit least_rotor_thrust is set without an airframe"),
+        (
+            {"rotor_thrust": 2.0, "airframe": AIRFRAME},
+            "limit rotor_thrust is 2 N; it must be above a qu",
+        ),
+        (
+            {"least_rotor_thrust": 2.1, "airframe": AIRFRAME},
+            "limit least_rotor_thrust is 2.1 N; it must be be",
+        ),
+        ({"rotor_thrust": 6.0, "airframe": 3}, "airframe is 3; it must be a peakflight.Airframe"),
+        ({"airframe": AIRFRAME}, "no limit is set"),
+        (
+            {"least_rotor_thrust": -1.0, "airframe": AIRFRAME},
+            "limit least_rotor_thrust is -1; it must be posi",
+        ),
+    ],
+)
+def test_rotor_limits_refuse(values, message):
+    refuses(message, Limits, **values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"mass": 0.0}, "airframe mass is 0.0; it must be positive"),
+        ({"lever": "long"}, "airframe lever is 'long'; it must be a number"),
+        ({"inertia": math.inf}, "airframe inertia is inf; it must be positive"),
+    ],
+)
+def test_airframe_refuses(values, message):
+    refuses(message, Airframe, **{"mass": 1.0, "inertia": 1e-3, "lever": 0.1, **values})
+
+
+def test_airframe_from_what_is_none():
+    refuses("airframe is {'mass': 1.0}; it must have mass, inertia, lever", Limits.from_dict,
+            {"speed": 1.0, "airframe": {"mass": 1.0}})  # fmt: skip
 
 
 def test_keeps_is_from_above_and_for_least_thrust_from_below():
@@ -270,7 +354,8 @@ def test_classes_refuse(arguments, message):
         ({"limits": {"speed": 5.0}}, r"limits is \{'speed': 5.0\}; it must be a peakflight.Limits"),
         (
             {"limits": Limits(tilt=0.5, least_thrust_acceleration=3.0)},
-            "none of the limits speed, thrust_acceleration, jerk, snap is set; set at least one",
+            "none of the limits speed, thrust_acceleration, jerk, snap, rotor_thrust is set; "
+            "set at least one",
         ),
         ({"minimize": "comfort"}, "minimize names 'comfort'"),
         ({"degree": 1}, "degree is 1; it must be 3 to 11"),

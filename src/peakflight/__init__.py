@@ -5,6 +5,7 @@ Importing the package is quick: what needs compiled kernels is imported when it 
 
 from typing import TYPE_CHECKING, Any
 
+from peakflight.airframe import Airframe
 from peakflight.course import Course, tidy
 from peakflight.errors import (
     InvalidFile,
@@ -34,6 +35,7 @@ __all__ = [
     "GRAVITY",
     "KINDS",
     "VEHICLES",
+    "Airframe",
     "Course",
     "FlatStates",
     "Heading",

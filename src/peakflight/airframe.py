@@ -1,7 +1,11 @@
 """The part of a vehicle that rotor limits are about."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
 
 from peakflight.errors import InvalidProblem
 
@@ -20,5 +24,24 @@ class Airframe:
     def __post_init__(self) -> None:
         for name in ("mass", "inertia", "lever"):
             value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+                raise InvalidProblem(f"airframe {name} is {value!r}; it must be a number")
+            object.__setattr__(self, name, float(value))
             if not (0.0 < value < math.inf):
                 raise InvalidProblem(f"airframe {name} is {value!r}; it must be positive")
+
+    @property
+    def reach(self) -> float:
+        """Collective acceleration that turning at 1 rad/s^2 takes from a rotor at worst, m.
+
+        sqrt(2) inertia / (lever mass): see `docs/certificate.md`.
+        """
+        return math.sqrt(2.0) * self.inertia / (self.lever * self.mass)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Airframe by the names of its fields, as `dataclasses.asdict` gives them."""
+        known = [field.name for field in fields(cls)]
+        if not isinstance(values, Mapping) or sorted(values) != sorted(known):
+            raise InvalidProblem(f"airframe is {values!r}; it must have {', '.join(known)}")
+        return cls(**values)

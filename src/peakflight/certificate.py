@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight.errors import InvalidProblem
-from peakflight.kernels import bernstein, bounds, joints, turning
+from peakflight.kernels import bernstein, bounds, joints, rotors, turning
 from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
@@ -25,6 +25,8 @@ JUMP_OF_LIMIT = 1e-4
 """A derivative that is limited may jump by this part of its limit, for rounding in short pieces."""
 TOLERANCE = 1e-10
 """Relative distance between the certified bound of a squared norm and an attained value."""
+LITTLE, EASES = 1e-2, (0.3, 1.0, 3.0, 10.0)
+"""Excess over a limit on rotors up to which these multiples of it are tried as a stretch."""
 
 
 def certify(
@@ -167,13 +169,28 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
     The certified trajectory and alpha, or None if no alpha keeps the limits.
     """
     _check_axes(trajectory)
-    coefficients = fresh(trajectory.coefficients)
-    times = fresh(trajectory.segment_times)
+    eased = 1.0 if limits.reach is None else _ease(trajectory, limits)
+    start = trajectory if eased == 1.0 else trajectory.stretch(eased)
+    coefficients, times = fresh(start.coefficients), fresh(start.segment_times)
     upper = np.empty((len(times), len(KINDS)))
     factor = bounds.certify(*_arguments(coefficients, times, limits, upper), bounds.ROUNDS)
     if not (np.isfinite(factor) and times.min() >= SHORTEST and times.max() <= LONGEST):
         return None
-    return Trajectory(coefficients, times, trajectory.start_time), float(factor)
+    return Trajectory(coefficients, times, trajectory.start_time), eased * float(factor)
+
+
+def _ease(trajectory: Trajectory, limits: Limits) -> float:
+    """A small stretch that keeps the limits, where they are exceeded by little; else 1.
+
+    A slower flight need not turn its thrust slower: the nearest stretch that does may be alone
+    among those that do not, which the search from the slow side would miss.
+    """
+    excess = np.nanmax(peak_ratios(trajectory, limits)) - 1.0
+    if 0.0 < excess <= LITTLE:
+        for stretch in 1.0 + excess * np.array(EASES):
+            if np.nanmax(peak_ratios(trajectory.stretch(stretch), limits)) <= 1.0:
+                return float(stretch)
+    return 1.0
 
 
 def peak_ratios(trajectory: Trajectory, limits: Limits) -> np.ndarray:
@@ -216,6 +233,7 @@ def _arguments(
         np.empty_like(upper),
         bounds.quotients_workspace(degree) if limits.on_leaning else None,
         turning.workspace(degree) if limits.on_turning else None,
+        None if limits.reach is None else rotors.workspace(degree, limits.reach),
     )
 
 
@@ -265,8 +283,11 @@ def _exceeded(peaks: dict[str, np.ndarray], limits: Limits) -> list[str]:
         kappa = peaks[kind.name]
         if not kappa.max() <= 1.0:  # NaN counts as exceeded
             segment = int(np.argmax(kappa))
-            lines.append(
-                f"{kind.label} reaches {kappa[segment]:.6g} times its limit of "
-                f"{getattr(limits, kind.name):g} {kind.unit} in segment {segment}"
-            )
+            reached = limits.attained(kind, float(kappa[segment]))
+            if kind.name == "least_rotor_thrust" and reached is not None:
+                how = f"falls to {reached:.6g} {kind.unit}, below its limit of"  # which may be 0
+            else:
+                how = f"reaches {kappa[segment]:.6g} times its limit of"
+            limit = getattr(limits, kind.name)
+            lines.append(f"{kind.label} {how} {limit:g} {kind.unit} in segment {segment}")
     return lines

@@ -4,16 +4,22 @@
 in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joint` sees) and one in
 `kernels/bounds.py` (what the certificate proves). Everything else, from the report to the command
 line, goes through `KINDS`.
+
+Rotor thrusts follow from the motion and the airframe, for the worst heading. With F = a + g e3, the
+angular acceleration alpha of its direction and the airframe's reach c, every rotor of a vehicle of
+mass m that does not twist about its thrust gives between m (|F| - c |alpha|) / 4 and
+m (|F| + c |alpha|) / 4.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from peakflight.airframe import Airframe
 from peakflight.errors import InvalidProblem
 
 GRAVITY = 9.81
@@ -40,13 +46,20 @@ KINDS = (
     LimitKind("least_thrust_acceleration", "m/s^2", 2, "least thrust acceleration"),
     LimitKind("body_rate", "rad/s", 3, "body rate"),
     LimitKind("angular_acceleration", "rad/s^2", 4, "angular acceleration"),
+    LimitKind("rotor_thrust", "N", 4, "rotor thrust"),
+    LimitKind("least_rotor_thrust", "N", 4, "least rotor thrust"),
 )
 """In the order in which kernels number them."""
 LABELS = {kind.name: kind.label for kind in KINDS}
 """Name of a limit to what it is called in tables and on axes."""
+_INDEX = {kind.name: index for index, kind in enumerate(KINDS)}
 
-BOUNDING = ("speed", "thrust_acceleration", "jerk", "snap")
+ROTORS = ("rotor_thrust", "least_rotor_thrust")
+"""Limits that are about an airframe."""
+BOUNDING = ("speed", "thrust_acceleration", "jerk", "snap", "rotor_thrust")
 """Limits that bound how fast any course can be flown; a straight climb needs no tilt."""
+UNBOUNDED = 1e8
+"""Ratios from here on stand for no bound at all, as for least thrust in free fall."""
 SMALLEST, LARGEST = 1e-6, 1e9
 """Range of values, in SI units: beyond, squares and fourth roots run out of digits."""
 
@@ -78,12 +91,19 @@ class Limits:
     """Largest angular speed of the direction of a + g e3, rad/s."""
     angular_acceleration: float | None = None
     """Largest angular acceleration of that direction, in a frame that does not twist, rad/s^2."""
+    rotor_thrust: float | None = None
+    """Largest thrust of a rotor, whatever the heading, N; more than a quarter of the weight."""
+    least_rotor_thrust: float | None = None
+    """Smallest thrust of a rotor, whatever the heading, N: 0 or more, below a quarter of the
+    weight."""
+    airframe: Airframe | None = None
+    """What turns motion into rotor thrusts; needed for limits on them."""
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for kind in KINDS:
+            value = getattr(self, kind.name)
             if value is not None:
-                object.__setattr__(self, field.name, _positive(field.name, value))
+                object.__setattr__(self, kind.name, _checked(kind.name, value))
         if self.thrust_acceleration is not None and self.thrust_acceleration <= GRAVITY:
             raise InvalidProblem(
                 f"limit thrust_acceleration is {self.thrust_acceleration:g} m/s^2; it must be "
@@ -99,8 +119,33 @@ class Limits:
                 f"limit least_thrust_acceleration is {least:g} m/s^2; it must be below gravity "
                 f"({GRAVITY} m/s^2), or the vehicle cannot hover"
             )
+        self._check_rotors()
         if not self.active:
             raise InvalidProblem("no limit is set; set at least one, such as speed=5.0")
+
+    def _check_rotors(self) -> None:
+        if not (self.airframe is None or isinstance(self.airframe, Airframe)):
+            raise InvalidProblem(f"airframe is {self.airframe!r}; it must be a peakflight.Airframe")
+        for name in ROTORS:
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if self.airframe is None:
+                raise InvalidProblem(
+                    f"limit {name} is set without an airframe; set airframe=Airframe(mass=..., "
+                    "inertia=..., lever=...) beside it"
+                )
+            hover = self.airframe.mass * GRAVITY / 4.0
+            if name == "rotor_thrust" and value <= hover:
+                raise InvalidProblem(
+                    f"limit rotor_thrust is {value:g} N; it must be above a quarter of the weight "
+                    f"({hover:g} N), or the vehicle cannot hover"
+                )
+            if name == "least_rotor_thrust" and value >= hover:
+                raise InvalidProblem(
+                    f"limit least_rotor_thrust is {value:g} N; it must be below a quarter of the "
+                    f"weight ({hover:g} N), or the vehicle cannot hover"
+                )
 
     @cached_property
     def active(self) -> tuple[LimitKind, ...]:
@@ -117,30 +162,83 @@ class Limits:
         """Whether how fast the thrust direction turns is limited: kernels of its own prove that."""
         return self.body_rate is not None or self.angular_acceleration is not None
 
+    @property
+    def reach(self) -> np.ndarray | None:
+        """(1,) of the airframe, m, where rotor thrust is limited; else kernels leave it out."""
+        if self.airframe is None or (self.rotor_thrust is None and self.least_rotor_thrust is None):
+            return None
+        return np.array([self.airframe.reach])
+
     def as_array(self) -> np.ndarray:
-        """Values in the order of `KINDS`, shape (len(KINDS),); NaN where nothing is limited."""
+        """What kernels hold kinds to, shape (len(KINDS),); NaN where nothing is limited.
+
+        Values in the order of `KINDS`. Rotor thrusts become accelerations: the most that four
+        rotors give, and how far below gravity that which the least of them stands for may fall.
+        """
         return self._values.copy()
 
     @cached_property
     def _values(self) -> np.ndarray:
-        values = (getattr(self, kind.name) for kind in KINDS)
-        return np.array([math.nan if value is None else value for value in values])
+        held = [getattr(self, kind.name) for kind in KINDS]
+        values = np.array([math.nan if value is None else value for value in held])
+        if self.airframe is not None:
+            most, least = (_INDEX[name] for name in ROTORS)
+            values[[most, least]] *= 4.0 / self.airframe.mass
+            values[least] = GRAVITY - values[least]
+        return values
 
-    def to_dict(self) -> dict[str, float]:
-        """The limits that are set, by name."""
-        return {kind.name: getattr(self, kind.name) for kind in self.active}
+    def ratios(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Kappa of the kinds that are set, from `limited_values` of the same airframe."""
+        found = {}
+        with np.errstate(divide="ignore"):
+            for kind in self.active:
+                limit, value = getattr(self, kind.name), values[kind.name]
+                if kind.name == "least_rotor_thrust" and self.airframe is not None:
+                    hover = self.airframe.mass * GRAVITY / 4.0
+                    found[kind.name] = np.maximum((hover - value) / (hover - limit), 0.0)
+                else:
+                    from_below = kind.name.startswith("least_")
+                    found[kind.name] = limit / value if from_below else value / limit
+        return found
+
+    def attained(self, kind: LimitKind, ratio: float) -> float | None:
+        """Value that a kappa stands for, in the unit of its kind; None where there is no bound.
+
+        Of the least rotor thrust, what keeps it and is at least that of hovering has kappa 0.
+        """
+        limit: float = getattr(self, kind.name)
+        if ratio >= UNBOUNDED:
+            return None
+        if kind.name == "least_rotor_thrust" and self.airframe is not None:
+            hover = self.airframe.mass * GRAVITY / 4.0
+            return hover - ratio * (hover - limit)
+        if kind.name.startswith("least_"):
+            return limit / ratio if ratio > 0.0 else None
+        return limit * ratio
+
+    def to_dict(self) -> dict[str, Any]:
+        """The limits that are set, by name, and the airframe if there is one."""
+        values: dict[str, Any] = {kind.name: getattr(self, kind.name) for kind in self.active}
+        if self.airframe is not None:
+            values["airframe"] = asdict(self.airframe)
+        return values
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Limits by name, as `to_dict` gives them."""
         known = [kind.name for kind in KINDS]
         for name in values:
-            if name not in known:
+            if name not in (*known, "airframe"):
                 raise InvalidProblem(f"unknown limit {name!r}; known are {', '.join(known)}")
-        return cls(**values)
+        given = dict(values)
+        if given.get("airframe") is not None:
+            given["airframe"] = Airframe.from_dict(given["airframe"])
+        return cls(**given)
 
 
-def limited_values(derivatives: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+def limited_values(
+    derivatives: Sequence[np.ndarray], airframe: Airframe | None = None
+) -> dict[str, np.ndarray]:
     """What each kind of limit is about, at samples of a motion.
 
     Parameters
@@ -148,6 +246,8 @@ def limited_values(derivatives: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     derivatives
         (..., 3) velocity, acceleration, ... as many as there are; kinds that need more are left
         out.
+    airframe
+        For rotor thrusts, which are left out without one.
 
     Returns
     -------
@@ -170,11 +270,15 @@ def limited_values(derivatives: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
         along = 2.0 * (thrust * jerk).sum(axis=-1, keepdims=True)
         along = along / np.where(square > 0.0, square, np.inf)
         values["angular_acceleration"] = _turn(thrust, derivatives[3] - along * jerk)
+    if len(derivatives) >= 4 and airframe is not None:
+        turning = airframe.reach * values["angular_acceleration"]
+        for name, sign in zip(ROTORS, (1.0, -1.0), strict=True):
+            values[name] = airframe.mass / 4.0 * (values["thrust_acceleration"] + sign * turning)
     return values
 
 
 def keeps(name: str, value: float, limit: float) -> bool:
-    """Whether a value of a kind keeps its limit: from below for the least thrust acceleration."""
+    """Whether a value of a kind keeps its limit: from below for what is least."""
     return value >= limit if name.startswith("least_") else value <= limit
 
 
@@ -193,11 +297,13 @@ def _turn(thrust: np.ndarray, motion: np.ndarray) -> np.ndarray:
     return values
 
 
-def _positive(name: str, value: Any) -> float:
+def _checked(name: str, value: Any) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
         raise InvalidProblem(f"limit {name} is {value!r}; it must be a number") from None
+    if name == "least_rotor_thrust" and number == 0.0:  # rotors that do not push down
+        return 0.0
     if not (math.isfinite(number) and number > 0.0):
         raise InvalidProblem(f"limit {name} is {number:g}; it must be positive and finite")
     if not SMALLEST <= number <= LARGEST:

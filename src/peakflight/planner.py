@@ -233,7 +233,7 @@ def _contradiction(problem: Problem) -> str:
     for index, state in problem.fixed.items():
         known = np.isfinite(state).all(axis=1)
         complete = state[: len(state) if known.all() else int(known.argmin())]
-        for name, value in limited_values(list(complete)).items():
+        for name, value in limited_values(list(complete), problem.limits.airframe).items():
             limit = getattr(problem.limits, name)
             if limit is not None and not keeps(name, float(value), limit):
                 return (

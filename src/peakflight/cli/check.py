@@ -127,7 +127,7 @@ def _as_dict(plan: Plan, report: Report, false_claims: Sequence[str]) -> dict[st
         segment = int(kappa.argmax())
         worst[kind.name] = {
             "limit": limit,
-            "reached": attained(kind, limit, float(kappa[segment])),
+            "reached": attained(plan.problem, kind, float(kappa[segment])),
             "unit": kind.unit,
             "ratio": float(kappa[segment]),
             "segment": segment,
@@ -188,7 +188,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
 def _limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
     for kind, limit in plan.problem.allowed.items():
         worst = float(report.peaks[kind.name].max())
-        reached = attained(kind, limit, worst)
+        reached = attained(plan.problem, kind, worst)
         yield (
             kind.label,
             amount(kind, limit),

@@ -8,13 +8,12 @@ from typing import Any
 
 import click
 
-from peakflight.limits import LimitKind
+from peakflight.limits import UNBOUNDED, LimitKind
+from peakflight.problem import Problem
 from peakflight.result import BINDING
 
 NARROWEST, WIDEST = 80, 100
 """Columns that output is laid out for, whatever the terminal has."""
-UNBOUNDED = 1e8
-"""Ratios from here on stand for no bound at all, as for least thrust in free fall."""
 STYLES = {"good": "bold green", "bad": "bold red", "title": "bold", "plain": ""}
 
 
@@ -97,13 +96,11 @@ def amount(kind: LimitKind, value: float) -> str:
     return f"{number(kind, value)} {'deg' if kind.unit == 'rad' else kind.unit}"
 
 
-def attained(kind: LimitKind, limit: float, ratio: float) -> float | None:
+def attained(problem: Problem, kind: LimitKind, ratio: float) -> float | None:
     """Value that a certified ratio stands for, in the unit of its kind; None where unbounded."""
-    if ratio >= UNBOUNDED:
-        return None
-    if kind.name.startswith("least_"):
-        return limit / ratio if ratio > 0.0 else None
-    return limit * ratio
+    if kind in problem.limits.active:
+        return problem.limits.attained(kind, ratio)
+    return problem.allowed[kind] * ratio if ratio < UNBOUNDED else None
 
 
 def ratio_cells(ratio: float) -> tuple[str, str, str]:

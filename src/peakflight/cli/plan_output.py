@@ -119,7 +119,7 @@ def _worst(plan: Plan) -> Iterator[Sequence[str]]:
         kappa = plan.report.peaks[kind.name]
         segment = int(kappa.argmax())
         worst = float(kappa[segment])
-        reached = attained(kind, limit, worst)
+        reached = attained(plan.problem, kind, worst)
         yield (
             kind.label,
             amount(kind, limit),

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from peakflight.airframe import Airframe
 from peakflight.figures.canvas import (
     FAINT,
     INK,
@@ -23,7 +24,15 @@ from peakflight.figures.canvas import (
     write_headline,
     write_note,
 )
-from peakflight.limits import KINDS, LARGEST, LimitKind, Limits, limited_values, plain_unit
+from peakflight.limits import (
+    KINDS,
+    LARGEST,
+    ROTORS,
+    LimitKind,
+    Limits,
+    limited_values,
+    plain_unit,
+)
 from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 
@@ -57,7 +66,7 @@ def derivatives_figure(plan: Plan) -> Figure:
     (kappa within 0.1 % of 1), a cross one that exceeds it.
     """
     trajectory, limits = plan.trajectory, plan.problem.limits
-    times, curves = sampled_curves(trajectory)
+    times, curves = sampled_curves(trajectory, limits.airframe)
     kinds = shown_kinds(limits, curves)
     figure = new_figure(panels_height(len(kinds)) + TOP)
     write_headline(figure, plan, 0.12)
@@ -76,22 +85,28 @@ def derivatives_figure(plan: Plan) -> Figure:
     return figure
 
 
-def sampled_curves(trajectory: Trajectory) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def sampled_curves(
+    trajectory: Trajectory, airframe: Airframe | None = None
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(K, n) s, and name of limit to (K, n): what it limits, densely enough for a curve."""
     count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
     local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
-    return trajectory.breakpoints[:-1, None] + local, sampled_values(trajectory, count)
+    return trajectory.breakpoints[:-1, None] + local, sampled_values(trajectory, count, airframe)
 
 
-def sampled_values(trajectory: Trajectory, count: int) -> dict[str, np.ndarray]:
+def sampled_values(
+    trajectory: Trajectory, count: int, airframe: Airframe | None = None
+) -> dict[str, np.ndarray]:
     """Name of limit to (K, count): what it limits, at even points of each piece.
 
     In the unit of the limit, but tilt in degrees.
     """
-    values = limited_values([trajectory.sample(count, order) for order in (1, 2, 3, 4)])
+    derivatives = [trajectory.sample(count, order) for order in (1, 2, 3, 4)]
+    values = limited_values(derivatives, airframe)
     values["tilt"] = np.degrees(values["tilt"])
-    for name in ("body_rate", "angular_acceleration"):  # in free fall they are infinite
-        values[name] = np.minimum(values[name], LARGEST)
+    for name in ("body_rate", "angular_acceleration", *ROTORS):  # in free fall they are infinite
+        if name in values:
+            values[name] = np.clip(values[name], -LARGEST, LARGEST)
     return values
 
 

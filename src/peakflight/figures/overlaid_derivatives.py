@@ -24,7 +24,7 @@ CUT = 4.0
 
 def overlaid_derivatives_figure(flights: Sequence[Flight], limits: Limits, *, title: str) -> Figure:
     """Draw speed, thrust acceleration, jerk, snap and what else is limited of several flights."""
-    curves = [sampled_curves(flight.trajectory) for flight in flights]
+    curves = [sampled_curves(flight.trajectory, limits.airframe) for flight in flights]
     begin = min(flight.trajectory.start_time for flight in flights)
     end = max(flight.trajectory.end_time for flight in flights)
     kinds = shown_kinds(limits, curves[0][1])
@@ -36,7 +36,7 @@ def overlaid_derivatives_figure(flights: Sequence[Flight], limits: Limits, *, ti
             axes.plot(times.ravel(), values[kind.name].ravel(), zorder=3, **flight.line_style)
         highest = max(float(values[kind.name].max()) for _, values in curves)
         limit = getattr(limits, kind.name)
-        cut = np.inf if limit is None else CUT * limit
+        cut = CUT * limit if limit else np.inf
         if kind.unit != "rad" and highest > cut:
             text = f"↑ {float(f'{highest:.3g}'):g}\n   {plain_unit(kind.unit)}"
             axes.text(

@@ -55,9 +55,9 @@ MOST_TICKS = 25
 BAR_WIDTH = 0.8
 """Relative to the distance between bars."""
 LEGEND_COLUMNS = 5
-SHADES = (1.0, 0.45, 0.75, 0.1, 0.3, 0.6, 0.9, 0.2)
+SHADES = (1.0, 0.45, 0.75, 0.1, 0.3, 0.6, 0.9, 0.2, 0.55, 0.0)
 """Colours of the kinds of limit in the order of `KINDS`: neighbours differ in lightness."""
-HATCHES = ("", "////", "....", "xxxx", r"\\\\", "++", "oo", "**")
+HATCHES = ("", "////", "....", "xxxx", r"\\\\", "++", "oo", "**", "--", "||")
 
 
 def segment_times_figure(plan: Plan, *, title: str | None = None) -> Figure:

@@ -38,10 +38,13 @@ BATCH = 64
 """Samples that are worked on together; the samples of a piece must divide it."""
 
 
-def workspace(count: int, degree: int, turning: bool) -> tuple[np.ndarray | None, ...]:
+def workspace(
+    count: int, degree: int, turning: bool, reach: np.ndarray | None
+) -> tuple[np.ndarray | None, ...]:
     """Scratch arrays of `evaluate` for a number of pieces.
 
     turning: whether kinds from TURNING on are limited; if not, kernels are compiled without them.
+    Likewise the reach of the airframe: None if no rotor thrust is limited.
     """
     batch = (3, 4, BATCH)
     return (
@@ -55,7 +58,8 @@ def workspace(count: int, degree: int, turning: bool) -> tuple[np.ndarray | None
         np.zeros(BATCH),
         np.zeros(EXPONENTS.size, dtype=np.bool_),
         np.zeros(4, dtype=np.bool_),
-        np.zeros(batch) if turning else None,
+        np.zeros(batch) if turning or reach is not None else None,
+        reach,
     )
 
 
@@ -70,7 +74,9 @@ def evaluate(
     (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
     p = 24 * 2^doublings.
     """
-    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders, pulls = work
+    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders, pulls, reach = (
+        work
+    )
     power = BASE_POWER * 2.0**doublings
     floor = np.exp(NEGLIGIBLE / power)  # of m^(1/e)
     cap = np.exp(CAP / power)
@@ -103,7 +109,7 @@ def evaluate(
             if not kinds[kind]:
                 continue
             row = KIND_ORDERS[kind] - 1
-            measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls)
+            measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls, reach)
             if _count_above(values, count, floor ** EXPONENTS[kind]) == 0:
                 continue
             if highest < 0:
@@ -114,7 +120,7 @@ def evaluate(
             barrier += _raise(values, count, EXPONENTS[kind], power, doublings, capped, grown)
             add_slopes(
                 kind, samples, squares, count, row, limits[kind], gravity, values, grown,
-                weights, vertical, pulls,
+                weights, vertical, pulls, reach,
             )  # fmt: skip
         for row in range(lowest, highest + 1):
             _pull(samples, weights, vertical, pulls, count, row)
@@ -135,7 +141,7 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     less the times will change, and the nearer a limit must be. Returns how many limits are exceeded
     that were not watched before.
     """
-    data, _, samples, squares, _, _, values, _, _, orders, pulls = work
+    data, _, samples, squares, _, _, values, _, _, orders, pulls, reach = work
     nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
     missed = 0
     count = values.size  # BATCH, but not as a literal, for which callees compile once more
@@ -148,7 +154,9 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
         for kind in range(EXPONENTS.size):
             if limits[kind] > 0.0:
                 row = KIND_ORDERS[kind] - 1
-                measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls)
+                measure(
+                    kind, samples, squares, count, row, limits[kind], gravity, values, pulls, reach
+                )
                 if not watched[k, kind] and _count_above(values, count, 1.0) > 0:
                     missed += 1
                 bound = max(nearest, 0.0) ** EXPONENTS[kind]

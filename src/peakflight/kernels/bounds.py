@@ -10,7 +10,8 @@ is written in the file, in exact arithmetic.
 
 A new kind of limit is a branch in `_range` and one in `_ratio`. Norms of one derivative need no
 more; tilt and least thrust are quotients (`_quotient`); kinds from TURNING on are about several
-derivatives at once (`kernels.turning`). Kinds are numbered as in `limits.KINDS`.
+derivatives at once (`kernels.turning`), those from ROTORS on about sums of norms
+(`kernels.rotors`). Kinds are numbered as in `limits.KINDS`.
 """
 
 import numpy as np
@@ -22,12 +23,15 @@ from peakflight.kernels.bernstein import (
     falling_factorials,
 )
 from peakflight.kernels.jit import inner, kernel, within
+from peakflight.kernels.rotors import largest_demand
 from peakflight.kernels.turning import binomials, largest_turn, required_stretch
 
-KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4])
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4, 4, 4])
 """The highest derivative that each kind is about."""
 TURNING = 6
 """Kinds from here on are about how the thrust direction turns."""
+ROTORS = 8
+"""Kinds from here on are about rotor thrusts: this one from above, the other from below."""
 DEPTH = 24
 """Intervals that wait at any one time; beyond, the hull of an interval is taken as it is."""
 NESTING = 40
@@ -59,7 +63,7 @@ def quotients_workspace(degree: int) -> np.ndarray:
 @kernel
 def certify(
     coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
-    turns, rounds,
+    turns, rotors, rounds,
 ):  # fmt: skip
     """Certified kappa of every piece and kind; and the smallest uniform stretch that keeps limits.
 
@@ -69,8 +73,8 @@ def certify(
     `lookup_tables`; upper and lower (K, kinds) get the bound and, but for rounding, a value that
     is attained (NaN for kinds that are not limited), place (K, kinds) where, in normalised time.
     denominators: `quotients_workspace`, or None where neither tilt nor least thrust is limited;
-    turns: `turning.workspace`, or None where no kind from TURNING on is. It is compiled without
-    them then.
+    turns: `turning.workspace`, or None where no kind from TURNING to ROTORS is; rotors:
+    `rotors.workspace`, or None where none from there on is. It is compiled without them then.
 
     With rounds = 1 that is all. With more, up to ROUNDS, a trajectory is then scaled until it just
     keeps every limit, certified: coefficients and times are replaced, and the stretch is returned,
@@ -84,7 +88,7 @@ def certify(
     for _ in range(rounds):
         _bound(
             coefficients, times, limits, gravity, tables, tolerance, upper, lower, place,
-            denominators, turns,
+            denominators, turns, rotors,
         )  # fmt: skip
         if rounds == 1:
             return factor
@@ -99,7 +103,16 @@ def certify(
                     needed = max(
                         needed,
                         _needed(
-                            kind, coefficients, k, times[k], at, limits, gravity, tables[2], turns
+                            kind,
+                            coefficients,
+                            k,
+                            times[k],
+                            at,
+                            limits,
+                            gravity,
+                            tables[2],
+                            turns,
+                            rotors,
                         ),
                     )
         if feasible:
@@ -133,13 +146,13 @@ def certify(
 @within
 def _bound(
     coefficients, times, limits, gravity, tables, tolerance, upper, lower, place, denominators,
-    turns,
+    turns, rotors,
 ):  # fmt: skip
     """One round of `certify`."""
     degree = coefficients.shape[1] - 1
     points = np.empty((degree + 1, 3))
     numerators = np.empty((DEPTH + 3, 2 * degree + 1))
-    ends = np.empty((DEPTH + 3, 3))
+    ends = np.empty((DEPTH + 3, 4))
     for k in range(times.size):
         for kind in range(limits.size):
             upper[k, kind] = np.nan
@@ -148,8 +161,8 @@ def _bound(
             if not limits[kind] > 0.0:
                 continue
             low, high, place[k, kind] = _range(
-                kind, coefficients, k, times[k], gravity, tables, tolerance, points, numerators,
-                denominators, ends, turns,
+                kind, limits[kind], coefficients, k, times[k], gravity, tables, tolerance, points,
+                numerators, denominators, ends, turns, rotors,
             )  # fmt: skip
             upper[k, kind] = _ratio(kind, high, limits[kind], True)
             lower[k, kind] = _ratio(kind, low, limits[kind], False)
@@ -167,15 +180,23 @@ def _rescale(coefficients, times, factor, scaled_coefficients, scaled_times):
 
 
 @inner
-def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials, turns):
+def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials, turns, rotors):
     """Uniform stretch that one kind asks for at one point of a piece."""
     order = KIND_ORDERS[kind]
+    if rotors is None:
+        pass
+    elif kind >= ROTORS:
+        return required_stretch(
+            order, _sign(kind), rotors[3][0], coefficients, piece, time, place, limits[kind],
+            gravity, factorials, rotors[2],
+        )  # fmt: skip
     if turns is None:
         pass
     elif kind >= TURNING:
         return required_stretch(
-            order, coefficients, piece, time, place, limits[kind], gravity, factorials, turns[2]
-        )
+            order, 0.0, 0.0, coefficients, piece, time, place, limits[kind], gravity, factorials,
+            turns[2],
+        )  # fmt: skip
     x = 0.0
     y = 0.0
     z = 0.0
@@ -208,13 +229,22 @@ def _required_stretch(kind, x, y, z, limit, gravity):
 
 @inner
 def _range(
-    kind, coefficients, piece, time, gravity, tables, tolerance, points, numerators, denominators,
-    ends, turns,
+    kind, limit, coefficients, piece, time, gravity, tables, tolerance, points, numerators,
+    denominators, ends, turns, rotors,
 ):  # fmt: skip
     """Bounds of the largest value of what a kind is about, from below and above, and where.
 
-    A kind that is left out, for want of its workspace, has no bound.
+    Of its square, if not of rotors. A kind that is left out, for want of its workspace, has no
+    bound.
     """
+    if rotors is None:
+        if kind >= ROTORS:
+            return np.inf, np.inf, 0.0
+    elif kind >= ROTORS:
+        return largest_demand(
+            _sign(kind), limit, coefficients, piece, time, gravity, tables, tolerance, points,
+            rotors, ends,
+        )  # fmt: skip
     if turns is None:
         if kind >= TURNING:
             return np.inf, np.inf, 0.0
@@ -243,6 +273,12 @@ def _range(
 
 
 @inner
+def _sign(kind):
+    """How the size of F enters what a kind of ROTORS is about."""
+    return 1.0 if kind == ROTORS else -1.0
+
+
+@inner
 def _quotient(kind, points, degree, error, product, numerators, denominators, ends):
     """Control points of the quotient whose maximum a kind bounds, in row 0 of the stacks.
 
@@ -268,9 +304,9 @@ def _quotient(kind, points, degree, error, product, numerators, denominators, en
 
 @inner
 def _ratio(kind, value, limit, is_bound):
-    """Kappa from the value that `_quotient` is about; a bound is rounded up."""
+    """Kappa from the value that `_range` is about; a bound is rounded up."""
     slack = 1.0 + 4.0 * EPSILON if is_bound else 1.0
-    root = np.sqrt(max(value, 0.0)) * slack
+    root = value if kind >= ROTORS else np.sqrt(max(value, 0.0)) * slack
     if kind == 4:
         ratio = np.arctan(root) * slack / limit if value < np.inf else np.pi / limit
     elif kind == 5:

@@ -78,6 +78,10 @@ class Limited(NamedTuple):
     """Some number if tilt or least thrust is among them; None leaves out what these need when
     kernels are compiled."""
     turning: np.ndarray | None
+    """Some number if how the thrust direction turns is limited; None likewise."""
+    reach: np.ndarray | None
+    """(1,) of the airframe, m, if rotor thrust is limited; None likewise."""
+    several: np.ndarray | None
     """Some number if a kind has more than one term; None likewise."""
     effort: np.ndarray | None
     """(4,) weight of the integral of each squared derivative in the objective; None likewise."""
@@ -144,9 +148,9 @@ def evaluate(layout, grid, limited, work, x):
             own = max(
                 own,
                 rows.constrain(
-                    limited.kinds[r], limited.leaning, limited.turning, work.samples[k], count,
-                    work.limits[k, r], limited.gravity[0], work.values[k, r], limited.first[r],
-                    work.slopes[k], work.bends[k],
+                    limited.kinds[r], limited.leaning, limited.turning, limited.reach,
+                    work.samples[k], count, work.limits[k, r], limited.gravity[0],
+                    work.values[k, r], limited.first[r], work.slopes[k], work.bends[k],
                 ),
             )  # fmt: skip
         needed = max(needed, own)
@@ -280,7 +284,7 @@ def assemble(layout, grid, limited, work, x):
             grid.products, powers, sums, columns, local,
         )  # fmt: skip
         local[3 * rows_, 3 * rows_] += time * (1.0 + work.stiffness[k])
-        _add_outer(limited.turning, grid, limited, work, k, time, local)
+        _add_outer(limited.several, grid, limited, work, k, time, local)
         _add_effort(
             limited.effort, grid, limited, work, k, time, weights, powers, sums, columns, local
         )
@@ -310,9 +314,9 @@ def _add_weights(dual, slack, bend, slope, single, weights):
 
 
 @inner
-def _add_outer(turning, grid, limited, work, k, time, local):
+def _add_outer(several, grid, limited, work, k, time, local):
     """Local += z/s times the outer products of gradients in several derivatives at once."""
-    if turning is None:
+    if several is None:
         return
     size = 3 * grid.orders.size
     column = np.empty(size + 1)
@@ -390,12 +394,12 @@ def lower(layout, grid, limited, work, x, slowly):
         for r in range(limited.kinds.size):
             kind, limit = limited.kinds[r], limited.values[r]
             rows.kappa(
-                kind, limited.leaning, limited.turning, near, count * cells, limit,
+                kind, limited.leaning, limited.turning, limited.reach, near, count * cells, limit,
                 limited.gravity[0], around,
             )  # fmt: skip
             rows.kappa(
-                kind, limited.leaning, limited.turning, work.samples[k], count, limit,
-                limited.gravity[0], there,
+                kind, limited.leaning, limited.turning, limited.reach, work.samples[k], count,
+                limit, limited.gravity[0], there,
             )  # fmt: skip
             for q in range(count):
                 peak = 1e-300

@@ -19,31 +19,41 @@ import numpy as np
 
 from peakflight.kernels.jit import inner, vector
 
-EXPONENTS = np.array([2, 2, 6, 8, 2, 2, 6, 8])
+EXPONENTS = np.array([2, 2, 6, 8, 2, 2, 6, 8, 2, 2])
 """e of each kind."""
-KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4])
+KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4, 4, 4])
 """The highest derivative that each kind is about."""
-LOWEST_ORDERS = np.array([1, 2, 3, 4, 2, 2, 2, 2])
+LOWEST_ORDERS = np.array([1, 2, 3, 4, 2, 2, 2, 2, 2, 2])
 """The lowest."""
 TURNING = 6
 """Kinds from here on are about how the thrust direction turns."""
+ROTORS = 8
+"""Kinds from here on are about rotor thrusts: this one from above, the other from below."""
 TINY = 1e-150
 """Added to what is divided by: a sample at rest has measure zero and slope zero."""
 ROUNDNESS = 1e-5
 """Least horizontal acceleration, as a part of gravity, that tilt knows: no kink when upright."""
 SOFTNESS = 1e-3
 """How early, as a part of gravity, the measure of tilt bends on its way to zero."""
+EASE = 1e-3
+"""Collective acceleration, as a part of gravity, that turning takes of a rotor in any case."""
 GUARD = 1e-3
 """Thrust acceleration, as a part of gravity, that the thrust direction has in any case."""
 
 
 @inner
-def measure(kind, samples, squares, count, row, limit, gravity, values, pulls):
+def measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach):
     """Values <- m of the first `count` samples.
 
     samples (3, 4, S) are derivatives 1 to 4, squares (4, S) their squared norms; row: which
-    derivative the kind is about, less one; pulls: as in `add_slopes`.
+    derivative the kind is about, less one; pulls, reach: as in `add_slopes`.
     """
+    if reach is None:
+        pass
+    elif kind >= ROTORS:
+        sign = 1.0 if kind == ROTORS else -1.0
+        _demand(sign, samples, count, limit, gravity, reach[0], values)
+        return
     if pulls is None:
         pass
     elif kind >= TURNING:
@@ -62,13 +72,20 @@ def measure(kind, samples, squares, count, row, limit, gravity, values, pulls):
 @inner
 def add_slopes(
     kind, samples, squares, count, row, limit, gravity, values, grown, weights, vertical,
-    pulls,
+    pulls, reach,
 ):  # fmt: skip
     """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m.
 
     Kinds from TURNING on add to pulls (3, 4, S) instead; it is None where none of them is limited,
-    which is known when the kernel is compiled.
+    which is known when the kernel is compiled. So is the reach (1,) of the airframe: None where no
+    rotor thrust is limited.
     """
+    if reach is None:
+        pass
+    elif kind >= ROTORS:
+        sign = 1.0 if kind == ROTORS else -1.0
+        _add_demand(sign, samples, count, limit, gravity, reach[0], values, grown, pulls)
+        return
     if pulls is None:
         pass
     elif kind >= TURNING:
@@ -196,37 +213,90 @@ def _swing(samples, q, row, gravity):
 
 @vector
 def _turn(samples, count, row, limit, gravity, values):
-    """(|F x y| / F.F)^2 / limit^2, as (y.y - (F.y)^2 / F.F) / F.F; see the top."""
+    """(|F x y| / F.F)^2 / limit^2; see the top."""
     factor = 1.0 / (limit * limit)
     for q in range(count):
-        fx, fy, fz, inverse, _, x, y, z = _swing(samples, q, row, gravity)
-        along = fx * x + fy * y + fz * z
-        across = max(x * x + y * y + z * z - along * along * inverse, 0.0)
-        values[q] = factor * inverse * across
+        values[q] = factor * _turn_of(samples, q, row, gravity)
+
+
+@vector
+def _turn_of(samples, q, row, gravity):
+    """(|F x y| / F.F)^2 of a sample, as (y.y - (F.y)^2 / F.F) / F.F; see the top."""
+    fx, fy, fz, inverse, _, x, y, z = _swing(samples, q, row, gravity)
+    along = fx * x + fy * y + fz * z
+    return inverse * max(x * x + y * y + z * z - along * along * inverse, 0.0)
 
 
 @vector
 def _add_turn(samples, count, row, limit, gravity, factor, values, grown, pulls):
-    twist = 2.0 if row == 3 else 0.0
     for q in range(count):
-        fx, fy, fz, inverse, r, x, y, z = _swing(samples, q, row, gravity)
-        jx = samples[0, 2, q]
-        jy = samples[1, 2, q]
-        jz = samples[2, 2, q]
-        c = inverse * (fx * x + fy * y + fz * z)
-        whole = 2.0 * factor * grown[q]
-        push = whole * inverse / (limit * limit * values[q] + TINY)
-        x = push * (x - c * fx)  # the slope by y
-        y = push * (y - c * fy)
-        z = push * (z - c * fz)
-        k = twist * inverse * (x * jx + y * jy + z * jz)  # minus that by F.j
-        f = r * k - whole * inverse
-        pulls[0, 1, q] += f * fx - c * x - k * jx
-        pulls[1, 1, q] += f * fy - c * y - k * jy
-        pulls[2, 1, q] += f * fz - c * z - k * jz
-        pulls[0, 2, q] -= r * x + k * fx
-        pulls[1, 2, q] -= r * y + k * fy
-        pulls[2, 2, q] -= r * z + k * fz
-        pulls[0, row, q] += x
-        pulls[1, row, q] += y
-        pulls[2, row, q] += z
+        square = limit * limit * values[q]
+        _pull_turn(samples, q, row, gravity, factor * grown[q], square, pulls)
+
+
+@vector
+def _pull_turn(samples, q, row, gravity, weight, square, pulls):
+    """Pulls += weight times the slope of the logarithm of `_turn_of`, which is `square`."""
+    twist = 2.0 if row == 3 else 0.0
+    fx, fy, fz, inverse, r, x, y, z = _swing(samples, q, row, gravity)
+    jx = samples[0, 2, q]
+    jy = samples[1, 2, q]
+    jz = samples[2, 2, q]
+    c = inverse * (fx * x + fy * y + fz * z)
+    whole = 2.0 * weight
+    push = whole * inverse / (square + TINY)
+    x = push * (x - c * fx)  # the slope by y
+    y = push * (y - c * fy)
+    z = push * (z - c * fz)
+    k = twist * inverse * (x * jx + y * jy + z * jz)  # minus that by F.j
+    f = r * k - whole * inverse
+    pulls[0, 1, q] += f * fx - c * x - k * jx
+    pulls[1, 1, q] += f * fy - c * y - k * jy
+    pulls[2, 1, q] += f * fz - c * z - k * jz
+    pulls[0, 2, q] -= r * x + k * fx
+    pulls[1, 2, q] -= r * y + k * fy
+    pulls[2, 2, q] -= r * z + k * fz
+    pulls[0, row, q] += x
+    pulls[1, row, q] += y
+    pulls[2, row, q] += z
+
+
+@vector
+def _load(sign, samples, q, gravity, reach):
+    """1 / |F|, +-(|F| - g), c |alpha| (rounded by EASE) and |alpha|^2 of a sample."""
+    fx = samples[0, 1, q]
+    fy = samples[1, 1, q]
+    fz = samples[2, 1, q] + gravity
+    thrust = np.sqrt(fx * fx + fy * fy + fz * fz + TINY)
+    square = _turn_of(samples, q, 3, gravity)
+    swing = np.sqrt(reach * reach * square + (EASE * gravity) ** 2)
+    return 1.0 / thrust, sign * (thrust - gravity), swing, square
+
+
+@vector
+def _demand(sign, samples, count, limit, gravity, reach, values):
+    """Square of the stretch at which a rotor would be at its limit, if demands scaled as below.
+
+    What is limited is +-(|F| - g) + c |alpha|, with c the reach of the airframe: at most the room
+    that hovering leaves. Stretched by x^(-1/2), it is about the first times x and the second times
+    x^2; 1/x solves room/x^2 - (+-(|F| - g))/x - c |alpha| = 0.
+    """
+    room = limit - gravity if sign > 0.0 else limit
+    for q in range(count):
+        _, over, swing, _ = _load(sign, samples, q, gravity, reach)
+        values[q] = (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room)
+
+
+@vector
+def _add_demand(sign, samples, count, limit, gravity, reach, values, grown, pulls):
+    room = limit - gravity if sign > 0.0 else limit
+    for q in range(count):
+        inverse, over, swing, square = _load(sign, samples, q, gravity, reach)
+        root = np.sqrt(over * over + 4.0 * room * swing)
+        push = 0.5 * grown[q] / root
+        along = sign * inverse * push
+        pulls[0, 1, q] += along * samples[0, 1, q]
+        pulls[1, 1, q] += along * samples[1, 1, q]
+        pulls[2, 1, q] += along * (samples[2, 1, q] + gravity)
+        weight = 0.5 * push / (values[q] + TINY) * reach * reach * square / swing
+        _pull_turn(samples, q, 3, gravity, weight, square, pulls)

@@ -15,10 +15,25 @@ import numpy as np
 
 from peakflight.kernels.jit import inner, vector
 
-KIND_TERMS: tuple[tuple[int, ...], ...] = ((1,), (2,), (3,), (4,), (2,), (2,), (2, 3), (2, 3, 4))
+KIND_TERMS: tuple[tuple[int, ...], ...] = (
+    (1,),
+    (2,),
+    (3,),
+    (4,),
+    (2,),
+    (2,),
+    (2, 3),
+    (2, 3, 4),
+    (2, 3, 4),
+    (2, 3, 4),
+)
 """The derivatives that each kind depends on."""
 LEANING = frozenset((4, 5))
 """Tilt and least thrust, which are compiled only where one of them is limited."""
+TURNING = frozenset((6, 7))
+"""Likewise those about how the thrust direction turns."""
+ROTORS = 8
+"""Likewise kinds from here on: rotor thrust from above, and from below."""
 ROOTS = np.array([0, 0, 1, 2])
 """Square roots taken of |d|^2 / L^2 for speed, thrust, jerk and snap: they tame high orders."""
 TINY = 1e-150
@@ -33,13 +48,13 @@ WEIGHTLESS = 1e-8
 
 @inner
 def constrain(
-    kind, leaning, turning, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes, bends
 ):
     """Values, slopes and bends of a kind at the samples of a piece; returns the stretch they need.
 
     samples (3, 4, S): axes, derivatives, samples; limits, values (S,); slopes (P, 3, S) and
     bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; leaning,
-    turning: None if no kind of theirs is limited.
+    turning, reach (1,) of the airframe: None if no kind of theirs is limited.
     """
     slope = slopes[first]
     bend = bends[first]
@@ -49,7 +64,9 @@ def constrain(
         return _norm(samples, kind, count, limits, ROOTS[kind], values, slope, bend)
     if kind < 6:
         return _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend)
-    return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
+    if kind < ROTORS:
+        return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
+    return _rotors(reach, kind, samples, count, limits, gravity, values, first, slopes, bends)
 
 
 @inner
@@ -73,14 +90,16 @@ def _turn(turning, kind, samples, count, limits, gravity, values, first, slopes,
 
 
 @inner
-def kappa(kind, leaning, turning, samples, count, limit, gravity, out):
+def kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out):
     """Out (S,) <- peak over limit of each sample (Eq. kapp_i, Eq. kappa2)."""
     if kind < 4:
         _norm_kappa(samples, kind, count, limit, out)
     elif kind < 6:
         _lean_kappa(leaning, kind, samples, count, limit, out)
-    else:
+    elif kind < ROTORS:
         _turn_kappa(turning, kind, samples, count, limit, gravity, out)
+    else:
+        _rotors_kappa(reach, kind, samples, count, limit, gravity, out)
 
 
 @inner
@@ -291,47 +310,108 @@ def _body_rate_kappa(samples, count, limit, gravity, out):
 @vector
 def _angular_acceleration(samples, count, limits, gravity, values, first, slopes, bends):
     """|s - 2 r j across F| / (|F| L) - 1 with r = F.j / F.F: how fast that turning changes."""
-    by_thrust = slopes[first]
-    by_jerk = slopes[first + 1]
-    by_snap = slopes[first + 2]
     worst = 0.0
     for q in range(count):
         square, turn, pull = _turn_of(samples, q, gravity)
-        size = 0.0
-        product = 0.0
-        rate = 0.0
-        for x in range(3):
-            across, swing = _across(samples, x, q, turn, pull)
-            size += swing * swing
-            product += swing * across
-            rate += across * across
+        size = _swing(samples, q, turn, pull)
         scale = 1.0 / (square * limits[q] * limits[q])
         worst = max(worst, size * scale)
         root, steep = _rooted(size * scale)
         values[q] = root - 1.0
-        unit = 2.0 * steep * scale
-        for x in range(3):
-            thrust = samples[x, 1, q]
-            across, swing = _across(samples, x, q, turn, pull)
-            by_thrust[x, q] = unit * (
-                (2.0 * turn * turn - pull) * swing
-                - 2.0 * product / square * (across - turn * thrust)
-                - size / square * thrust
-            )
-            by_jerk[x, q] = -2.0 * unit * (turn * swing + product / square * thrust)
-            by_snap[x, q] = unit * swing
-        bends[first, q] = unit * size / square
-        bends[first + 1, q] = 4.0 * unit * (turn * turn + rate / square)
-        bends[first + 2, q] = unit
+        _swing_slopes(samples, q, square, turn, pull, 2.0 * steep * scale, first, slopes, bends)
     return worst**0.125
+
+
+@inner
+def _swing(samples, q, turn, pull):
+    """|s - 2 r j across F|^2 of a sample."""
+    size = 0.0
+    for x in range(3):
+        _, swing = _across(samples, x, q, turn, pull)
+        size += swing * swing
+    return size
+
+
+@inner
+def _swing_slopes(samples, q, square, turn, pull, unit, first, slopes, bends):
+    """Slopes and bends of unit / 2 times |s - 2 r j across F|^2, over |F|^2, times |F|^2."""
+    size = 0.0
+    product = 0.0
+    rate = 0.0
+    for x in range(3):
+        across, swing = _across(samples, x, q, turn, pull)
+        size += swing * swing
+        product += swing * across
+        rate += across * across
+    for x in range(3):
+        thrust = samples[x, 1, q]
+        across, swing = _across(samples, x, q, turn, pull)
+        slopes[first, x, q] = unit * (
+            (2.0 * turn * turn - pull) * swing
+            - 2.0 * product / square * (across - turn * thrust)
+            - size / square * thrust
+        )
+        slopes[first + 1, x, q] = -2.0 * unit * (turn * swing + product / square * thrust)
+        slopes[first + 2, x, q] = unit * swing
+    bends[first, q] = unit * size / square
+    bends[first + 1, q] = 4.0 * unit * (turn * turn + rate / square)
+    bends[first + 2, q] = unit
 
 
 @vector
 def _angular_acceleration_kappa(samples, count, limit, gravity, out):
     for q in range(count):
         square, turn, pull = _turn_of(samples, q, gravity)
-        size = 0.0
+        out[q] = np.sqrt(_swing(samples, q, turn, pull) / square) / limit
+
+
+@inner
+def _rotors(reach, kind, samples, count, limits, gravity, values, first, slopes, bends):
+    """Rotor thrusts; not compiled where they are not limited."""
+    if reach is None:
+        return 0.0
+    sign = 1.0 if kind == ROTORS else -1.0
+    return _demand(sign, reach[0], samples, count, limits, gravity, values, first, slopes, bends)
+
+
+@vector
+def _demand(sign, reach, samples, count, limits, gravity, values, first, slopes, bends):
+    """(|F| + c |alpha|) / L - 1 for the most, (g - |F| + c |alpha| - L) / g for the least thrust.
+
+    c is the reach of the airframe; c |alpha| is rounded by ROUNDNESS, to the safe side. The stretch
+    x^-2 is that at which +-(|F| - g) x + c |alpha| x^2 would meet the limit.
+    """
+    worst = 0.0
+    for q in range(count):
+        square, turn, pull = _turn_of(samples, q, gravity)
+        thrust = np.sqrt(square)
+        size = _swing(samples, q, turn, pull)
+        swing = np.sqrt(reach * reach * size / square + (ROUNDNESS * gravity) ** 2)
+        room = limits[q] - gravity if sign > 0.0 else limits[q]
+        over = sign * (thrust - gravity)
+        worst = max(worst, (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room))
+        unit = 1.0 / limits[q] if sign > 0.0 else 1.0 / gravity
+        values[q] = unit * (over + swing - room)
+        bend = unit * reach * reach / (swing * square)
+        _swing_slopes(samples, q, square, turn, pull, bend, first, slopes, bends)
         for x in range(3):
-            _, swing = _across(samples, x, q, turn, pull)
-            size += swing * swing
-        out[q] = np.sqrt(size / square) / limit
+            slopes[first, x, q] += sign * unit / thrust * samples[x, 1, q]
+        bends[first, q] += max(sign, 0.0) * unit / thrust
+    return np.sqrt(worst)
+
+
+@inner
+def _rotors_kappa(reach, kind, samples, count, limit, gravity, out):
+    if reach is None:
+        return
+    sign = 1.0 if kind == ROTORS else -1.0
+    _demand_kappa(sign, reach[0], samples, count, limit, gravity, out)
+
+
+@vector
+def _demand_kappa(sign, reach, samples, count, limit, gravity, out):
+    rest = gravity if sign < 0.0 else 0.0
+    for q in range(count):
+        square, turn, pull = _turn_of(samples, q, gravity)
+        swing = reach * np.sqrt(_swing(samples, q, turn, pull) / square)
+        out[q] = (rest + sign * np.sqrt(square) + swing) / limit

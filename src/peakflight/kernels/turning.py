@@ -164,7 +164,7 @@ def largest_turn(order, coefficients, piece, time, gravity, tables, tolerance, p
         at = 0.5
         if splits < GUIDED and 0 < index < size:
             at = _newton(work, size, index / size)
-        _split(stack, waiting, degree, at)
+        split(stack, waiting, degree, at)
         middle = ends[waiting, 0] + at * width
         ends[waiting + 1, 0] = ends[waiting, 0]
         ends[waiting + 1, 1] = middle
@@ -310,7 +310,7 @@ def _newton(work, size, at):
 
 
 @inner
-def _split(stack, row, degree, at):
+def split(stack, row, degree, at):
     """De Casteljau: row + 1 <- the part before `at`, row <- the part after."""
     rest = 1.0 - at
     for c in range(stack.shape[2]):
@@ -324,20 +324,18 @@ def _split(stack, row, degree, at):
 
 
 @inner
-def required_stretch(order, coefficients, piece, time, place, limit, gravity, factorials, motion):
-    """Uniform stretch from which on a point turns no faster than the limit; 0 if it never does.
+def required_stretch(
+    order, sign, reach, coefficients, piece, time, place, limit, gravity, factorials, motion
+):
+    """Uniform stretch from which on a point keeps a limit; 0 if it always does.
 
-    motion (3, 3) is scratch. Searched for from where the point is, with steps towards the border
-    that a power law would not overstep, then closed by false position.
+    order, sign, reach: what is limited, see `_excess`; motion (3, 3) is scratch. Searched for from
+    where the point is, with steps towards the border that a power law would not overstep, then
+    closed by false position.
     """
-    for s in range(2, order + 1):
-        for d in range(3):
-            value = 0.0
-            for j in range(coefficients.shape[1] - 1, s - 1, -1):
-                value = value * (place * time) + factorials[s, j] * coefficients[piece, j, d]
-            motion[s - 2, d] = value
+    motion_at(order, coefficients, piece, place * time, factorials, motion)
     low = 0.0
-    value = _excess(order, motion, low, limit, gravity)
+    value = _excess(order, sign, reach, motion, low, limit, gravity)
     if value <= -700.0:
         return 0.0
     sense = 1.0 if value > 0.0 else -1.0
@@ -348,13 +346,13 @@ def required_stretch(order, coefficients, piece, time, place, limit, gravity, fa
         low = high
         value = other
         high = low + sense * min(max(NEAREST, abs(value) / 8.0), FURTHEST)
-        other = _excess(order, motion, high, limit, gravity)
+        other = _excess(order, sign, reach, motion, high, limit, gravity)
         steps += 1
         if steps > STEPS:
             return np.exp(high)
     for _ in range(STEPS):
         middle = (low * other - high * value) / (other - value)
-        found = _excess(order, motion, middle, limit, gravity)
+        found = _excess(order, sign, reach, motion, middle, limit, gravity)
         if found * other <= 0.0:
             low = high
             value = other
@@ -368,8 +366,23 @@ def required_stretch(order, coefficients, piece, time, place, limit, gravity, fa
 
 
 @inner
-def _excess(order, motion, log_stretch, limit, gravity):
-    """Logarithm of value over limit of a point, stretched; between -700 and 50."""
+def motion_at(order, coefficients, piece, time, factorials, motion):
+    """Motion (3, 3) <- acceleration to the derivative `order` of a piece, at a time."""
+    for s in range(2, order + 1):
+        for d in range(3):
+            value = 0.0
+            for j in range(coefficients.shape[1] - 1, s - 1, -1):
+                value = value * time + factorials[s, j] * coefficients[piece, j, d]
+            motion[s - 2, d] = value
+
+
+@inner
+def _excess(order, sign, reach, motion, log_stretch, limit, gravity):
+    """Logarithm of value over limit of a point, stretched; between -700 and 50.
+
+    The value is how fast the thrust direction turns (order 3) or how fast that changes (4) if sign
+    is 0, else what `rotors` is about.
+    """
     power = np.exp(-log_stretch)
     square = power * power
     x = motion[0, 0] * square
@@ -388,6 +401,10 @@ def _excess(order, motion, log_stretch, limit, gravity):
     f = z * u - x * w
     h = x * v - y * u
     turn = np.sqrt(e * e + f * f + h * h)
-    if np.isnan(turn):
+    value = turn / length
+    if sign != 0.0:
+        rest = gravity if sign < 0.0 else 0.0
+        value = rest + sign * np.sqrt(length) + reach * value
+    if np.isnan(value):
         return 50.0
-    return max(min(np.log(turn / (length * limit)), 50.0), -700.0) if turn > 0.0 else -700.0
+    return max(min(np.log(value / limit), 50.0), -700.0) if value > 0.0 else -700.0

@@ -9,7 +9,7 @@ import numpy as np
 from peakflight.kernels import basis
 from peakflight.kernels.conditions import Grid, Layout, Limited, Work
 from peakflight.kernels.interior import MARKS
-from peakflight.kernels.rows import KIND_TERMS, LEANING
+from peakflight.kernels.rows import KIND_TERMS, LEANING, TURNING
 
 CELL = 5
 """Points at which the neighbourhood of a sample is looked at."""
@@ -154,11 +154,15 @@ def get_data(layout: Layout, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def make_limited(
-    limits: np.ndarray, effort: np.ndarray | None, gravity: float, least: float = 0.0
+    limits: np.ndarray,
+    effort: np.ndarray | None,
+    gravity: float,
+    least: float = 0.0,
+    reach: np.ndarray | None = None,
 ) -> Limited:
     """What is limited, from `Limits.as_array` and weights (4,) of integrals of squares, or None.
 
-    least: smallest stretch of interest, see `Limited`.
+    least: smallest stretch of interest, reach: of `Limits`, see `Limited`.
     """
     kinds = np.flatnonzero(np.isfinite(limits))
     terms = [KIND_TERMS[kind] for kind in kinds]
@@ -168,7 +172,9 @@ def make_limited(
         first=np.cumsum([0, *map(len, terms)]),
         orders=np.array([order - 1 for term in terms for order in term]),
         leaning=np.ones(1) if LEANING.intersection(kinds) else None,
-        turning=np.ones(1) if any(len(term) > 1 for term in terms) else None,
+        turning=np.ones(1) if TURNING.intersection(kinds) else None,
+        reach=reach,
+        several=np.ones(1) if any(len(term) > 1 for term in terms) else None,
         effort=effort,
         gravity=np.array([gravity]),
         least=np.array([least]),

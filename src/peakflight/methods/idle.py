@@ -6,7 +6,7 @@ the way, and more of them help; the part of the flight that is idle is about wha
 
 import numpy as np
 
-from peakflight.limits import KINDS, Limits, limited_values
+from peakflight.limits import Limits, limited_values
 from peakflight.trajectory import Trajectory
 
 SAMPLES = 16
@@ -18,15 +18,11 @@ MOST_PARTS = 4
 def idle_times(trajectory: Trajectory, limits: Limits) -> np.ndarray:
     """(K,) s: integral over each piece of how much faster than it is each sample could be flown."""
     derivatives = [trajectory.sample(SAMPLES, order) for order in range(1, 5)]
-    values = limited_values(derivatives)
+    ratios = limits.ratios(limited_values(derivatives, limits.airframe))
     stretch = np.zeros(derivatives[0].shape[:2])
-    for kind in KINDS:
-        limit = getattr(limits, kind.name)
-        if limit is not None:
-            value = values[kind.name]
-            with np.errstate(divide="ignore"):
-                ratio = limit / value if kind.name.startswith("least_") else value / limit
-            stretch = np.maximum(stretch, np.minimum(ratio, 1.0) ** (1.0 / kind.order))
+    for kind in limits.active:
+        ratio = np.minimum(ratios[kind.name], 1.0)
+        stretch = np.maximum(stretch, ratio ** (1.0 / kind.order))
     return trajectory.segment_times * np.trapezoid(1.0 - stretch, dx=1.0 / (SAMPLES - 1), axis=1)
 
 

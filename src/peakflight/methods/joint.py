@@ -15,9 +15,9 @@ import numpy as np
 from peakflight.certificate import peak_ratios, stretch_to_limits
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import basis, interior, unknowns
-from peakflight.kernels.conditions import Layout
+from peakflight.kernels.conditions import LEAST, Layout
 from peakflight.kernels.interior import Begin
-from peakflight.limits import GRAVITY, KINDS
+from peakflight.limits import GRAVITY
 from peakflight.methods import (
     Outcome,
     limit_kernels,
@@ -26,15 +26,14 @@ from peakflight.methods import (
     require,
     require_whole,
 )
+from peakflight.methods.classes import complete, without_class
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.methods.start import Start, guess, start_of
-from peakflight.problem import DEGREES, Problem, derivative_name
+from peakflight.problem import Problem
 from peakflight.result import History, Plan
 from peakflight.spline import coefficients_of
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
-DEGREE = 7
-"""Degree where the problem leaves it to the method."""
 STARTS = ("guess", "proportional", "peak")
 SAMPLES, SAMPLES_OF_MANY = 16, 14
 """Points of a piece at which limits are constraints: of a whole leg, and of a part of one."""
@@ -54,6 +53,8 @@ TIGHTENINGS = 8
 """Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
 NARROWINGS, NARROW = 4, 2e-3
 """Rounds of the same, where peaks between samples would cost more than this part of the time."""
+BEYOND = 1e-5
+"""Part of a limit by which it is lowered further then, where it is about rotors."""
 HOPELESS = 0.2
 """Excess over a limit that lowering limits is not tried for."""
 ROUNDS = 3
@@ -163,9 +164,9 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     """The fastest trajectory of its class, or the least of time and effort, feasible."""
     limit = math.inf if settings.time_limit is None else settings.time_limit
     deadline = time.perf_counter() + limit
-    complete = _complete(problem)
-    task = _Task(complete, settings, _effort(complete, settings), deadline)
-    legs = len(complete.waypoints) - 1
+    completed = complete(problem)
+    task = _Task(completed, settings, _effort(completed, settings), deadline)
+    legs = len(completed.waypoints) - 1
     if settings.max_pieces is not None and settings.max_pieces < legs:
         raise InvalidProblem(
             f"max_pieces is {settings.max_pieces}; the course has {legs} legs, and each needs one"
@@ -180,13 +181,13 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     runs = _runs(task, problem)
     iterations = sum(run.iterations for run in runs)
     outcome = replace(
-        _finished(task, runs), problem=complete, iterations=iterations, history=_history(runs)
+        _finished(task, runs), problem=completed, iterations=iterations, history=_history(runs)
     )
     infeasible = outcome.status is Status.INFEASIBLE
     doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
     if not (infeasible or (doubtful and task.effort is None)):
         return outcome
-    spline = _without_class(problem)
+    spline = without_class(problem)
     other = peak.solve(spline, peak.Settings())
     faster = other.trajectory.duration < (1.0 - TIE) * outcome.trajectory.duration
     if other.status is Status.INFEASIBLE or not (infeasible or faster):
@@ -198,45 +199,6 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         iterations=iterations + other.iterations,
         message=FELL_BACK,
     )
-
-
-def _complete(problem: Problem) -> Problem:
-    """The problem with degree and continuity filled in."""
-    highest = _highest(problem)
-    degree = problem.degree
-    if degree is None:
-        degree = min(max(DEGREE, 2 * highest + 1), DEGREES[-1])
-    most = basis.counts(degree)[1] - 1
-    if highest > most:
-        raise InvalidProblem(
-            f"{derivative_name(highest)} is fixed at a waypoint; method joint fixes up to "
-            f"{derivative_name(most)} at degree {degree}"
-        )
-    continuity = most if problem.continuity is None else problem.continuity
-    if continuity > most:
-        raise InvalidProblem(
-            f"continuity is {continuity}; method joint has up to {most} at degree {degree}"
-        )
-    if degree == problem.degree and continuity == problem.continuity:
-        return problem
-    return replace(problem, degree=degree, continuity=continuity)
-
-
-def _highest(problem: Problem) -> int:
-    """The highest derivative that is fixed at a waypoint; 0 if none is."""
-    fixed = [np.flatnonzero(np.isfinite(state).any(axis=1)) for state in problem.fixed.values()]
-    return 1 + max((int(rows[-1]) for rows in fixed if len(rows)), default=-1)
-
-
-def _without_class(problem: Problem) -> Problem:
-    """The problem for a spline of the natural class, of a cost that leaves room for what is fixed.
-
-    The optimum for a cost on the r-th derivative holds derivatives up to the one before.
-    """
-    highest = _highest(problem)
-    if highest < problem.spline_class.cost_order:
-        return replace(problem, degree=None, continuity=None)
-    return replace(problem, minimize={highest + 1: 1.0}, degree=None, continuity=None)
 
 
 def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
@@ -331,13 +293,15 @@ def _run(
     grid = unknowns.make_grid(class_.degree, SAMPLES if whole else SAMPLES_OF_MANY)
     limits = problem.limits.as_array() if limits is None else limits
     free = problem.is_at_rest and task.effort is None
-    limited = unknowns.make_limited(limits, task.effort, GRAVITY, 0.0 if free else 1.0)
+    limited = unknowns.make_limited(
+        limits, task.effort, GRAVITY, 0.0 if free else 1.0, problem.limits.reach
+    )
     work = unknowns.make_work(layout, grid, limited)
     unknowns.set_unknowns(layout, start.data, start.starts, start.times, work.x)
     if start.dual is not None and start.dual.shape == work.dual.shape:
         work.dual[:] = start.dual
     tolerance = settings.tolerance if tolerance is None else tolerance
-    if not problem.is_at_rest and begin in (GOING_ON, AGAIN):
+    if not _eases(problem) and begin in (GOING_ON, AGAIN):
         begin = begin._replace(margin=0.0, slack=WARM.slack)
     at_once = settings.iterations if math.isinf(task.deadline) else CHUNK
     code, left, anew = interior.LIMIT, settings.iterations, True
@@ -376,6 +340,14 @@ def _run(
     )
 
 
+def _eases(problem: Problem) -> bool:
+    """Whether a little slower is a little easier, so that runs go on from a stretch.
+
+    It is not with motion that is fixed, nor for rotors: a stretch turns F.
+    """
+    return problem.is_at_rest and problem.limits.reach is None
+
+
 def _is_sound(layout: Layout, x: np.ndarray) -> bool:
     """Whether unknowns are numbers that a trajectory can have."""
     times = x[layout.clock]
@@ -388,18 +360,24 @@ def _is_sound(layout: Layout, x: np.ndarray) -> bool:
 
 def _finished(task: _Task, runs: list[_Run]) -> Outcome:
     """The best run, made feasible exactly."""
+    best: Outcome | None = None
     for run in sorted(runs, key=lambda run: run.objective):
         if task.problem.is_at_rest:
             found, last = _stretched(task, run)
         else:
             found, last = _tightened(task, run)
-        if found is not None:
-            return Outcome(
+        if found is not None and (best is None or found.duration < best.trajectory.duration):
+            best = Outcome(
                 status=_status(task, last),
                 trajectory=found,
                 pieces=tuple(run.pieces.tolist()),
                 memory=last.dual,
             )
+        missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
+        if best is not None and (_eases(task.problem) or task.is_late or not missed):
+            break
+    if best is not None:
+        return best
     return Outcome(
         status=Status.INFEASIBLE,
         trajectory=runs[-1].trajectory,
@@ -413,12 +391,13 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
     """The exact uniform stretch; with effort, only where limits are exceeded.
 
     Where it costs more than samples told, limits are lowered and the problem is solved again: a
-    narrow peak between samples need not slow down the whole flight.
+    narrow peak between samples need not slow down the whole flight. For rotors there may be no
+    stretch that is worth having; then limits are lowered until the motion keeps them as it is.
     """
-    limits = task.problem.limits
+    limits, eases = task.problem.limits, _eases(task.problem)
     lowered = limits.as_array()
     best, answer = None, run
-    for _ in range(NARROWINGS):
+    for _ in range(NARROWINGS if eases else TIGHTENINGS):
         found: Trajectory | None = run.trajectory
         if task.effort is None or _excess(task, run.trajectory).any():
             stretched = stretch_to_limits(run.trajectory, limits)
@@ -428,8 +407,11 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
         missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
         if task.is_late or not missed:
             break
-        lowered = _lowered(lowered, np.fmin(_excess(task, run.trajectory), HOPELESS))
-        run = _from(task, run, GOING_ON, lowered)
+        excess = _excess(task, run.trajectory)
+        if not eases:
+            excess = np.where(excess > 0.0, 2.0 * excess + BEYOND, 0.0)
+        lowered = _lowered(lowered, np.fmin(excess, HOPELESS))
+        run = _from(task, run, GOING_ON if eases else WARM, lowered)
     if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
         answer = replace(answer, solved=False)
     return best, answer
@@ -442,8 +424,8 @@ def _excess(task: _Task, trajectory: Trajectory) -> np.ndarray:
 
 
 def _lowered(limits: np.ndarray, excess: np.ndarray) -> np.ndarray:
-    """Limits (len(KINDS),) lowered, or raised where they hold from below, by an excess."""
-    from_below = np.array([kind.name.startswith("least_") for kind in KINDS])
+    """What kernels hold kinds to (len(KINDS),), lowered by an excess; raised where from below."""
+    from_below = np.arange(len(limits)) == LEAST
     return np.where(from_below, limits / (1.0 - excess), limits * (1.0 - excess))
 
 
@@ -486,7 +468,7 @@ def _given(task: _Task, problem: Problem) -> Start | None:
     if settings.initial == "guess":
         return None
     method = peak if settings.initial == "peak" else proportional
-    found = method.solve(_without_class(problem), method.Settings())
+    found = method.solve(without_class(problem), method.Settings())
     return start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
 
 
