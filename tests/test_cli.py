@@ -474,6 +474,20 @@ class TestVehicles:
         assert "for crazyflie-2.1" in checked.stdout
         assert json.loads(run("check", "out/plan.json", "--json").stdout)["vehicle"] == stock.name
 
+    def test_rotors_in_place_of_the_limits_that_stand_for_them(
+        self, run: Run, folder: Path
+    ) -> None:
+        options = ("--vehicle", "racing-quad", "--rotors", "--limits", "speed=9")
+        result = run("plan", "lap.csv", "-o", "out", *options)
+        assert result.exit_code == 0
+        plan = pf.Plan.load(folder / "out" / "plan.json")
+        quad = pf.VEHICLES["racing-quad"]
+        assert plan.problem.limits == replace(quad.on_rotors().limits, speed=9.0)
+        assert plan.report.peaks["rotor_thrust"].max() <= 1.0
+        assert "rotor thrust " in result.stdout
+        assert run("check", "out/plan.json").exit_code == 0
+        refused(run("plan", "lap.csv", "--rotors"), "--rotors needs --vehicle")
+
     def test_check_takes_other_limits_whole(self, run: Run, folder: Path) -> None:
         run("plan", "lap.csv", "--vehicle", "racing-quad", "-o", "out", *QUICK)
         result = run("check", "out/plan.json", "--limits", "speed=90", "--json")

@@ -183,6 +183,21 @@ class Vehicle:
         kept = {name: why for name, why in self.reasons.items() if merged[name] == own[name]}
         return replace(self, limits=Limits.from_dict(merged), reasons=kept)
 
+    def on_rotors(self) -> Self:
+        """The vehicle limited by its rotors and its body rate, in place of what stands for them.
+
+        There is no margin then: every rotor keeps its range at any heading, with the yaw at rest,
+        and nothing of it is left for control.
+        """
+        least, most = self.rotor_thrust
+        limits = Limits(
+            rotor_thrust=most,
+            least_rotor_thrust=least,
+            body_rate=None if self.body_rate is None else self.body_rate[0],
+            airframe=self.airframe,
+        )
+        return replace(self, limits=limits, reasons={})
+
     def has_default_limits(self) -> bool:
         """Whether the limits are those that follow from the other figures."""
         try:

@@ -12,6 +12,8 @@ from peakflight.limits import KINDS, LimitKind, Limits
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES, find_vehicle
 
+ON_ROTORS = "peakflight.on_rotors"
+"""Where a command keeps whether `--rotors` was given."""
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
@@ -76,7 +78,16 @@ def limits_source(vehicle: Vehicle | None, given: Limits | None) -> str:
 
 
 def vehicle_option(command: _Command) -> _Command:
-    """Option `--vehicle` of a command, a `Vehicle`; None if not given."""
+    """Options `--vehicle` and `--rotors` of a command, a `Vehicle`; None if not given."""
+    command = click.option(
+        "--rotors",
+        is_flag=True,
+        expose_value=False,
+        is_eager=True,
+        callback=_remember,
+        help="Limit the vehicle's rotors and its body rate themselves, without a margin, in place "
+        "of its default limits.",
+    )(command)
     return click.option(
         "--vehicle",
         metavar="NAME|FILE.yaml",
@@ -154,10 +165,22 @@ def vehicle_of(
     context: click.Context, parameter: click.Parameter, text: str | None
 ) -> Vehicle | None:
     """Find the vehicle that an option or argument names."""
+    on_rotors = context.meta.get(ON_ROTORS, False)
+    if text is None:
+        if on_rotors:
+            raise click.UsageError("--rotors needs --vehicle", context)
+        return None
     try:
-        return None if text is None else find_vehicle(text)
+        vehicle = find_vehicle(text)
+        return vehicle.on_rotors() if on_rotors else vehicle
     except InvalidProblem as error:
         raise click.BadParameter(str(error), context, parameter) from None
+
+
+def _remember(context: click.Context, parameter: click.Parameter, given: bool) -> None:
+    """For `vehicle_of`, which comes after it."""
+    del parameter
+    context.meta[ON_ROTORS] = given
 
 
 def _number(kind: LimitKind, text: str) -> float:
