@@ -390,15 +390,31 @@ def test_limits_and_fixed_yaw_that_are_not_kept_are_said(plan):
     assert problems == ["the yaw is not 1 rad throughout"]
 
 
-def test_old_plan_files_still_load_and_are_proven_as_before(plan):
+@pytest.mark.parametrize("asked", ["heading", "array"])
+def test_a_yaw_motion_that_was_taken_out_is_missed(plan, asked):
     values = plan.to_dict()
     del values["yaw"]
-    values["problem"]["yaw"] = [0.0, 1.0, 2.0, 3.0, 4.0]
-    old = pf.Plan.from_dict(values)
-    assert old.yaw_motion is None
-    assert pf.certify_plan(old).feasible
-    values["problem"]["yaw"] = plan.problem.yaw.to_dict()  # a motion that was taken out
-    assert not pf.certify_plan(pf.Plan.from_dict(values)).feasible
+    if asked == "array":
+        values["problem"]["yaw"] = [0.0, 1.0, 2.0, 3.0, 4.0]
+    found = pf.Plan.from_dict(values)
+    assert found.yaw_motion is None
+    assert pf.certify_plan(found).problems == ("there is no yaw motion",)
+
+
+def test_a_yaw_motion_that_nobody_asked_for_is_not_proven(plan):
+    values = plan.to_dict()
+    values["problem"]["yaw"] = None
+    report = pf.certify_plan(pf.Plan.from_dict(values))
+    assert not report.feasible
+    assert report.problems[0].startswith("there is a yaw motion, but nothing is asked")
+
+
+def test_small_jumps_do_not_add_up(plan):
+    count = 1000
+    steps = 1e-8 * np.arange(count)
+    yaw = pf.Trajectory(steps[:, None, None], np.full(count, plan.duration / count))
+    _, problems = proven(plan, yaw)
+    assert any(line.startswith("yaw jumps by 1e-08") for line in problems)
 
 
 def test_yaw_of_more_axes_is_refused(plan):

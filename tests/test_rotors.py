@@ -16,12 +16,15 @@ from peakflight import (
     GRAVITY,
     KINDS,
     Airframe,
+    InvalidProblem,
     Limits,
     Plan,
+    Problem,
     Status,
     Trajectory,
     certify,
     certify_plan,
+    find_vehicle,
     plan,
     read_course,
     stretch_to_limits,
@@ -292,3 +295,29 @@ def test_planning_for_rotors_beats_slowing_down():
     spline = plan(waypoints, limits=RACING_RATE, method="peak").duration
     joint = plan(waypoints, limits=RACING_RATE).duration
     assert joint < spline < slowed
+
+
+# ---- what cannot be proven is refused ---------------------------------------------------------
+
+
+WAYPOINTS = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 1.5], [3.0, 2.0, 1.0]])
+
+
+@pytest.mark.parametrize("yaw", [0.0, "velocity", [0.0, 1.0, 2.0]])
+def test_a_yaw_beside_limits_on_rotors_is_refused(yaw):
+    with pytest.raises(InvalidProblem, match="a heading that does not twist"):
+        Problem(WAYPOINTS, limits=RACING, yaw=yaw)
+
+
+def test_limits_about_another_airframe_than_the_vehicle_are_refused():
+    racer = find_vehicle("racing-quad").on_rotors()
+    assert Problem(WAYPOINTS, vehicle=racer).limits == racer.limits
+    other = replace(racer.limits, airframe=replace(racer.airframe, mass=0.4))
+    with pytest.raises(InvalidProblem, match="vehicle racing-quad has Airframe"):
+        Problem(WAYPOINTS, vehicle=racer, limits=other)
+
+
+@pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, 1e-200, 10**400, "heavy", True])
+def test_an_airframe_that_makes_no_sense_is_refused(mass):
+    with pytest.raises(InvalidProblem, match=r"^airframe mass is "):
+        Airframe(mass=mass, inertia=1e-3, lever=0.1)

@@ -2,12 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 from typing import Any, Self
 
 import numpy as np
 
 from peakflight.errors import InvalidProblem
+
+SMALLEST, LARGEST = 1e-9, 1e9
+"""What figures of an airframe may be, in SI units."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,9 +29,18 @@ class Airframe:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
                 raise InvalidProblem(f"airframe {name} is {value!r}; it must be a number")
+            if isinstance(value, int) and abs(value) > LARGEST:
+                raise InvalidProblem(f"airframe {name} is above {LARGEST:g}")
             object.__setattr__(self, name, float(value))
-            if not (0.0 < value < math.inf):
-                raise InvalidProblem(f"airframe {name} is {value!r}; it must be positive")
+            if not SMALLEST <= value <= LARGEST:
+                raise InvalidProblem(
+                    f"airframe {name} is {value!r}; it must be from {SMALLEST:g} to {LARGEST:g}"
+                )
+
+    def is_near(self, other: "Airframe") -> bool:
+        """Whether two airframes are the same but for rounding."""
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return all(math.isclose(one, two, rel_tol=1e-9) for one, two in pairs)
 
     @property
     def reach(self) -> float:

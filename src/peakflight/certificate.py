@@ -18,7 +18,6 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
-from peakflight.yaw import Heading
 from peakflight.yaw_certificate import certify_yaw
 
 JUMP_OF_LIMIT = 1e-4
@@ -117,10 +116,7 @@ def certify(
 
 def certify_plan(plan: Plan) -> Report:
     """Prove a plan again, from its trajectory, yaw motion, limits and waypoints alone."""
-    yaw = plan.yaw_motion
-    if yaw is None and not isinstance(plan.problem.yaw, Heading):  # from before there were any
-        return _certify_flight(plan.problem, plan.trajectory, plan.pieces)
-    return certify_answer(plan.problem, plan.trajectory, plan.pieces, yaw=yaw)
+    return certify_answer(plan.problem, plan.trajectory, plan.pieces, yaw=plan.yaw_motion)
 
 
 def certify_answer(
@@ -133,7 +129,10 @@ def certify_answer(
     """Prove that a trajectory answers a problem, and a yaw motion in one axis its heading."""
     report = _certify_flight(problem, trajectory, pieces)
     if problem.heading is None:
-        return report
+        if yaw is None:
+            return report
+        line = "there is a yaw motion, but nothing is asked of the yaw that could be proven"
+        return replace(report, feasible=False, problems=(*report.problems, line))
     counts = (1,) * len(trajectory) if pieces is None else pieces
     passed = trajectory.breakpoints[np.concatenate(([0], np.cumsum(counts)))]
     peaks, problems = certify_yaw(problem.heading, yaw, trajectory, passed)

@@ -7,8 +7,9 @@ line, goes through `KINDS`.
 
 Rotor thrusts follow from the motion and the airframe, for the worst heading. With F = a + g e3, the
 angular acceleration alpha of its direction and the airframe's reach c, every rotor of a vehicle of
-mass m that does not twist about its thrust gives between m (|F| - c |alpha|) / 4 and
-m (|F| + c |alpha|) / 4.
+mass m that does not twist about its thrust, with equal inertias about roll and pitch and no drag,
+gives between m (|F| - c |alpha|) / 4 and m (|F| + c |alpha|) / 4. A yaw that is held or steered
+twists the vehicle, which takes more.
 """
 
 import math
@@ -163,9 +164,14 @@ class Limits:
         return self.body_rate is not None or self.angular_acceleration is not None
 
     @property
+    def on_rotors(self) -> bool:
+        """Whether rotor thrust is limited, most or least."""
+        return any(getattr(self, name) is not None for name in ROTORS)
+
+    @property
     def reach(self) -> np.ndarray | None:
         """(1,) of the airframe, m, where rotor thrust is limited; else kernels leave it out."""
-        if self.airframe is None or (self.rotor_thrust is None and self.least_rotor_thrust is None):
+        if self.airframe is None or not self.on_rotors:
             return None
         return np.array([self.airframe.reach])
 

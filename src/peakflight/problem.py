@@ -160,6 +160,11 @@ class Problem:
                 vehicle = vehicle.with_limits(self.limits)
             object.__setattr__(self, "vehicle", vehicle)
             object.__setattr__(self, "limits", vehicle.limits)
+            airframe = vehicle.limits.airframe
+            if airframe is not None and not airframe.is_near(vehicle.airframe):
+                raise InvalidProblem(
+                    f"limits are about {airframe}; vehicle {vehicle.name} has {vehicle.airframe}"
+                )
         if all(getattr(self.limits, name) is None for name in BOUNDING):
             raise InvalidProblem(
                 f"none of the limits {', '.join(BOUNDING)} is set; set at least one, or nothing "
@@ -172,6 +177,11 @@ class Problem:
         spline_class = self.spline_class
         if self.yaw is not None:
             object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
+            if self.limits.on_rotors:
+                raise InvalidProblem(
+                    "limits on rotors are proven for a heading that does not twist about the "
+                    "thrust; leave yaw out, or limit thrust and angular acceleration instead"
+                )
         rest = spline_class.end_orders
         for name in ("start", "end"):
             state = fixed_state(name, getattr(self, name), axes, spline_class.degree, zeros=rest)

@@ -53,7 +53,7 @@ class Heading:
     alone turns."""
 
     def __post_init__(self) -> None:
-        if self.policy not in ASKED:
+        if not isinstance(self.policy, str) or self.policy not in ASKED:
             raise InvalidProblem(f"yaw policy is {self.policy!r}; known are {', '.join(ASKED)}")
         for name in filter(None, ASKED.values()):
             given = getattr(self, name) is not None

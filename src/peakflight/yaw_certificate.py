@@ -17,6 +17,8 @@ ROUNDING = 16.0 * 2.220446049250313e-16
 """Error of a value of degree 3 or a derivative of it, relative to the sum of its terms' sizes."""
 JUMP_OF_LIMIT = 1e-4
 """A jump may have this part of the limit on what jumps, however short the pieces."""
+SMALLEST_JUMP = 1e-10
+"""Largest jump of an angle, rad, but for rounding."""
 ANGLE_TOLERANCE = 1e-8
 """Largest miss of an angle that is asked for, rad."""
 TIME_TOLERANCE = 1e-9
@@ -116,6 +118,7 @@ def _jumps(coefficients: np.ndarray, times: np.ndarray, heading: Heading) -> lis
     factors = np.array([[1.0, 1.0, 1.0, 1.0], [0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 2.0, 6.0]])
     sizes = (np.abs(coefficients) * powers).sum(axis=1)
     caps = {kind.order: JUMP_OF_LIMIT * limit for kind, limit in heading.limits.items()}
+    caps[0] = SMALLEST_JUMP + ROUNDING * float(sizes.max())  # small ones add up over many pieces
     lines = []
     for order, what in enumerate(WHAT):
         begins = factors[order, order] * coefficients[:, order]

@@ -18,6 +18,7 @@ from peakflight.cli.output import (
     print_json,
     ranges,
     ratio_cells,
+    rotor_notes,
     seconds,
 )
 from peakflight.cli.progress import Progress
@@ -182,6 +183,8 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
             ),
         ]
     )
+    for note in rotor_notes(plan.problem):
+        out.line(f"note: {note}")
     out.show()
 
 

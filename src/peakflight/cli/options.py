@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from peakflight.errors import InvalidProblem, quoted
-from peakflight.limits import KINDS, LimitKind, Limits
+from peakflight.limits import KINDS, ROTORS, LimitKind, Limits
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES, find_vehicle
 
@@ -39,7 +39,11 @@ def parse_limits(text: str) -> Limits:
         If an item is not name=value, a name is unknown or given twice, a value is not a number,
         or the limits are against their own rules.
     """
-    return Limits.from_dict(named_values(text, {kind.name: kind for kind in KINDS}))
+    values = named_values(text, {kind.name: kind for kind in KINDS})
+    for name in ROTORS:
+        if name in values:
+            raise InvalidProblem(f"limit {name} is about a vehicle; write --vehicle NAME --rotors")
+    return Limits.from_dict(values)
 
 
 def named_values(text: str, kinds: Mapping[str, LimitKind]) -> dict[str, float]:
@@ -85,8 +89,8 @@ def vehicle_option(command: _Command) -> _Command:
         expose_value=False,
         is_eager=True,
         callback=_remember,
-        help="Limit the vehicle's rotors and its body rate themselves, without a margin, in place "
-        "of its default limits.",
+        help="Limit the vehicle's rotors, and its body rate across the thrust, themselves, without "
+        "a margin, in place of its default limits; for a heading that does not twist.",
     )(command)
     return click.option(
         "--vehicle",

@@ -103,6 +103,16 @@ def attained(problem: Problem, kind: LimitKind, ratio: float) -> float | None:
     return problem.allowed[kind] * ratio if ratio < UNBOUNDED else None
 
 
+def rotor_notes(problem: Problem) -> tuple[str, ...]:
+    """What limits on rotors are proven for, if there are any."""
+    if not problem.limits.on_rotors:
+        return ()
+    return (
+        "rotor thrusts are proven for a heading that does not twist about the thrust, equal "
+        "inertias and no drag; a yaw that is held takes more",
+    )
+
+
 def ratio_cells(ratio: float) -> tuple[str, str, str]:
     """A ratio to a limit, the distance to the limit, and what that means in a word."""
     if ratio >= UNBOUNDED:

@@ -6,7 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from peakflight.cli.options import limits_source, written
-from peakflight.cli.output import Printout, amount, attained, number, ratio_cells, seconds
+from peakflight.cli.output import (
+    Printout,
+    amount,
+    attained,
+    number,
+    ratio_cells,
+    rotor_notes,
+    seconds,
+)
 from peakflight.cli.yaw_options import written_yaw
 from peakflight.limits import Limits
 from peakflight.result import Plan
@@ -78,7 +86,7 @@ def print_plan(
     out.line()
     out.path(f"wrote to {folder}:")
     out.pairs((path.name, summaries[name]) for name, path in files.items())
-    _print_notes(out, after)
+    _print_notes(out, (*rotor_notes(plan.problem), *after))
     out.show()
 
 

@@ -63,7 +63,7 @@ def rotors_figure(plan: Plan) -> Figure:
     across, about = map(_rounded, vehicle.body_rate) if vehicle.body_rate else (None, None)
     figure = new_figure(panels_height(3) + LEGEND + TOP)
     write_headline(figure, plan, 0.12)
-    turning = "yaw 0" if plan.problem.yaw is None else "the yaw of the course"
+    turning = "yaw 0" if plan.problem.yaw is None else "the yaw of the plan"
     write_note(figure, f"{vehicle.name}, {turning}", WIDTH - 0.12)
     panels = add_panels(figure, 3)
     curves = (
