@@ -6,6 +6,7 @@ effect outside the figure. Margins are fixed: a layout engine would draw everyth
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -114,6 +115,43 @@ def write(
         color=INK,
         zorder=5,
         bbox=paper if on_white else None,
+    )
+
+
+def draw_limit(axes: Axes, value: float) -> None:
+    """Draw a limit across the axes."""
+    axes.axhline(value, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
+
+
+def write_limit(axes: Axes, height: float, text: str) -> None:
+    """Write what a limit is, right of the axes at a height in their units."""
+    axes.text(
+        1.012,
+        height,
+        text,
+        transform=axes.get_yaxis_transform(),
+        ha="left",
+        va="center",
+        fontsize=TEXT,
+        color=LIMIT,
+    )
+
+
+def name_lines(figure: Figure, axes: Axes, top: float, columns: int, **more: Any) -> None:
+    """Say which line is which, `top` inches below the upper edge; more: of `Axes.legend`."""
+    across, up = figure.get_size_inches()
+    style = {"handlelength": 2.6, "columnspacing": 1.4, **more}
+    axes.legend(
+        loc="upper left",
+        bbox_to_anchor=(0.1 / across, 1.0 - top / up),
+        bbox_transform=figure.transFigure,
+        ncols=columns,
+        frameon=False,
+        fontsize=TEXT,
+        labelcolor=INK,
+        borderaxespad=0.0,
+        borderpad=0.0,
+        **style,
     )
 
 

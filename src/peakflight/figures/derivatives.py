@@ -17,11 +17,13 @@ from peakflight.figures.canvas import (
     TEXT,
     WIDTH,
     add_axes,
+    draw_limit,
     even_step,
     new_figure,
     span,
     text_width,
     write_headline,
+    write_limit,
     write_note,
 )
 from peakflight.limits import (
@@ -158,20 +160,12 @@ def scale_panel(
         unit, limit = "°", None if limit is None else float(np.degrees(limit))
     top = max(highest, 1e-12)
     if limit is not None:
-        axes.axhline(limit, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
+        draw_limit(axes, limit)
         far = limit > FAR * top
         top = top if far else max(top, limit)
-        place = (1.012, HEADROOM * top if far else limit)
         space = "" if unit == "°" else " "
-        axes.text(
-            *place,
-            f"{limit:.6g}{space}{unit}" + (" ↑" if far else ""),
-            transform=axes.get_yaxis_transform(),
-            ha="left",
-            va="center",
-            fontsize=TEXT,
-            color=LIMIT,
-        )
+        text = f"{limit:.6g}{space}{unit}" + (" ↑" if far else "")
+        write_limit(axes, HEADROOM * top if far else limit, text)
     axes.set(xlim=times, ylim=(0.0, HEADROOM * top))
     axes.locator_params(axis="y", nbins=4)
     label = textwrap.fill(kind.label, 14) + f"\n({unit})"

@@ -17,6 +17,7 @@ from peakflight.figures.canvas import (
     WIDTH,
     add_axes,
     even_step,
+    name_lines,
     new_figure,
     shortened,
     text_width,
@@ -87,18 +88,5 @@ def differences_figure(
         FuncFormatter(lambda value, _: f"{value:+g} %" if value else "0")
     )
     axes.set_xlabel(axis, fontsize=TEXT, color=INK)
-    axes.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.1 / WIDTH, 1.0 - 0.3 / figure.get_size_inches()[1]),
-        bbox_transform=figure.transFigure,
-        ncols=len(handles),
-        frameon=False,
-        fontsize=TEXT,
-        labelcolor=INK,
-        handletextpad=0.2,
-        columnspacing=1.6,
-        borderaxespad=0.0,
-        borderpad=0.0,
-    )
+    name_lines(figure, axes, 0.3, len(handles), handles=handles, handletextpad=0.2)
     return figure

@@ -12,10 +12,10 @@ from matplotlib.patches import Patch
 
 from peakflight.figures.canvas import (
     COLOURS,
-    INK,
     POINTS,
     TEXT,
     WIDTH,
+    name_lines,
     seconds,
     text_width,
 )
@@ -112,27 +112,15 @@ def write_legend(
     figure: Figure, axes: Axes, flights: Sequence[Flight], *, as_bars: bool = False
 ) -> None:
     """Name the flights with their total times, under the title."""
-    across, up = figure.get_size_inches()
     handles: list[Artist] = []
     for flight in flights:
         if as_bars:
             handles.append(Patch(color=flight.colour, linewidth=0.0, label=flight.label))
         else:
             handles.append(Line2D([], [], label=flight.label, **flight.line_style))
-    axes.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.1 / across, 1.0 - LEGEND_TOP / up),
-        bbox_transform=figure.transFigure,
-        ncols=_columns(flights),
-        frameon=False,
-        fontsize=TEXT,
-        labelcolor=INK,
-        handlelength=1.2 if as_bars else 2.6,
-        columnspacing=1.4,
-        borderaxespad=0.0,
-        borderpad=0.0,
-        labelspacing=0.25,
+    short = {"handlelength": 1.2} if as_bars else {}
+    name_lines(
+        figure, axes, LEGEND_TOP, _columns(flights), handles=handles, labelspacing=0.25, **short
     )
 
 

@@ -10,12 +10,13 @@ from peakflight.errors import InvalidProblem
 from peakflight.figures.canvas import (
     COLOURS,
     INK,
-    LIMIT,
-    TEXT,
     WIDTH,
+    draw_limit,
+    name_lines,
     new_figure,
     span,
     write_headline,
+    write_limit,
     write_note,
 )
 from peakflight.figures.derivatives import (
@@ -77,7 +78,7 @@ def rotors_figure(plan: Plan) -> Figure:
         if kind is not THRUST:
             axes.plot(times, values, color=INK, linewidth=1.0, zorder=3)
     _draw_rotors(panels[0], times, states.rotor_thrust, least)
-    _name_rotors(figure, panels[0])
+    name_lines(figure, panels[0], 0.28, len(STYLES))
     number_legs(panels[0], plan.waypoint_times)
     return figure
 
@@ -101,32 +102,5 @@ def _draw_rotors(axes: Axes, times: np.ndarray, thrusts: np.ndarray, least: floa
         )
     lowest = min(float(thrusts.min()), 0.0)
     axes.set_ylim(bottom=HEADROOM * lowest)
-    axes.axhline(least, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
-    axes.text(
-        1.012,
-        least,
-        f"{least:g} N",
-        transform=axes.get_yaxis_transform(),
-        ha="left",
-        va="center",
-        fontsize=TEXT,
-        color=LIMIT,
-    )
-
-
-def _name_rotors(figure: Figure, axes: Axes) -> None:
-    """Say which line is which rotor, under the headline."""
-    across, up = figure.get_size_inches()
-    axes.legend(
-        loc="upper left",
-        bbox_to_anchor=(0.1 / across, 1.0 - 0.28 / up),
-        bbox_transform=figure.transFigure,
-        ncols=len(STYLES),
-        frameon=False,
-        fontsize=TEXT,
-        labelcolor=INK,
-        handlelength=2.6,
-        columnspacing=1.4,
-        borderaxespad=0.0,
-        borderpad=0.0,
-    )
+    draw_limit(axes, least)
+    write_limit(axes, least, f"{least:g} N")

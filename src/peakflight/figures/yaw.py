@@ -6,14 +6,15 @@ from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
     INK,
-    LIMIT,
     SOFT,
     TEXT,
     WIDTH,
     add_axes,
+    draw_limit,
     new_figure,
     span,
     write_headline,
+    write_limit,
     write_note,
 )
 from peakflight.figures.derivatives import (
@@ -128,17 +129,8 @@ def _draw_limit(axes: Axes, highest: float, limit: float | None, unit: str) -> N
     if limit is None:
         return
     for value in (-limit, limit):
-        axes.axhline(value, color=LIMIT, linestyle=(0, (5, 2.5)), linewidth=1.0, zorder=2)
-    axes.text(
-        1.012,
-        limit,
-        f"{limit:.6g} {unit}",
-        transform=axes.get_yaxis_transform(),
-        ha="left",
-        va="center",
-        fontsize=TEXT,
-        color=LIMIT,
-    )
+        draw_limit(axes, value)
+    write_limit(axes, limit, f"{limit:.6g} {unit}")
 
 
 def _name(axes: Axes, text: str) -> None:
