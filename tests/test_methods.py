@@ -19,6 +19,7 @@ from peakflight import (
     Problem,
     Status,
     Trajectory,
+    certify,
     certify_plan,
     minimum_effort_spline,
     plan,
@@ -299,7 +300,9 @@ def test_body_rate_and_angular_acceleration_are_kept(method, extra, options):
 def test_one_or_two_limits(method, limits):
     waypoints = random_course(np.random.default_rng(7), 5)
     made = check(plan(waypoints, method=method, limits=Limits(**limits)))
-    assert made.report.worst >= 1.0 - 1e-8
+    # the stretch is closed to 1e-9; near free fall kappa may be steep in it
+    faster = made.trajectory.stretch(1.0 - 2e-9)
+    assert not certify(faster, made.problem.limits).feasible
     assert set(made.report.peaks) == set(limits)
 
 
