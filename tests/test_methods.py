@@ -727,7 +727,7 @@ def test_the_registry_names_modules_that_solve():
         registry.find("magic")
 
 
-def test_the_default_method_is_peak():
+def test_the_default_method_is_joint():
     assert plan(CORNER, **JERK).method == "joint"
 
 
