@@ -31,6 +31,8 @@ ATTITUDE = 2
 LEAST_STEP, LARGEST_STEP, STEPS = 1e-10, 1e-2, 200
 """How much slower, relative, a flight gets at first and at most, and how often, where a limit is
 still exceeded: by rounding, or because a slower flight need not turn its thrust more slowly."""
+NO_CHANGE = 1e-9
+"""A plan that keeps its limits is left as it is where its pace would change by less, relative."""
 STEP_GROWTH = 4.0
 """Of one such step over the one before."""
 ROUNDING = 1e-12
@@ -324,6 +326,8 @@ def _fitted(plan: Plan, *, least: float) -> Plan:
     if found is None or _is_unproven(plan):
         return plan
     factor = max(found[1], _yaw_stretch(plan) * (1.0 + ROUNDING), least)
+    if plan.feasible and abs(factor - 1.0) <= NO_CHANGE:
+        return plan
     step = LEAST_STEP
     for _ in range(STEPS):
         change = 100.0 * abs(factor - 1.0)

@@ -3,7 +3,14 @@
 import numpy as np
 
 from peakflight.course import MERGE_DISTANCE
-from peakflight.editing import ATTITUDE, answer, continuity_at_rest, rest_orders, steered, under_limits
+from peakflight.editing import (
+    ATTITUDE,
+    answer,
+    continuity_at_rest,
+    rest_orders,
+    steered,
+    under_limits,
+)
 from peakflight.errors import InvalidProblem
 from peakflight.limits import Limits
 from peakflight.planner import plan as plan_course
@@ -174,4 +181,4 @@ def _heading(first: Plan, second: Plan, apart: bool) -> Heading | None:
         given = [getattr(asked, name) for asked in (one, two) if asked is not None]
         limits[name] = min((value for value in given if value is not None), default=None)
     passed = np.concatenate((angles[0], angles[1] if apart else angles[1][1:]))
-    return Heading(policy="waypoints", angles=tuple(passed.tolist()), **limits)  # type: ignore[arg-type]
+    return Heading(policy="waypoints", angles=tuple(passed.tolist()), **limits)

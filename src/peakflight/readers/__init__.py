@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from peakflight.errors import InvalidFile, InvalidProblem
-from peakflight.files import PathLike, reason, read_text
+from peakflight.files import PathLike, read_text, reason
 from peakflight.readers import pieces, plan_json, samples
 from peakflight.readers.value import TrajectoryFile
 from peakflight.trajectory import Trajectory
@@ -39,7 +39,14 @@ READERS = {
 }
 """In the order in which they are asked; samples are what is left."""
 
-__all__ = ["READERS", "TOLERANCE", "Reader", "TrajectoryFile", "read_trajectory", "read_trajectory_file"]
+__all__ = [
+    "READERS",
+    "TOLERANCE",
+    "Reader",
+    "TrajectoryFile",
+    "read_trajectory",
+    "read_trajectory_file",
+]
 
 
 def read_trajectory(path: PathLike, *, tolerance: float = TOLERANCE) -> Trajectory:

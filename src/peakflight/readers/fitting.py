@@ -36,7 +36,7 @@ def through_states(times: np.ndarray, states: np.ndarray, tolerance: float) -> T
         m.
     """
     count = len(states)
-    inverse = np.linalg.inv(_ends(count))
+    inverse = np.linalg.inv(end_rows(count))
     allowed = tolerance / INSTANT ** np.arange(CHECKED)
     pieces, durations, first, step = [], [], 0, 1
     last = len(times) - 1
@@ -110,7 +110,7 @@ def through_positions(times: np.ndarray, points: np.ndarray, tolerance: float) -
 
 
 def through_angles(times: np.ndarray, angles: np.ndarray, tolerance: float) -> Trajectory:
-    """A cubic spline near (n,) angles, rad, at (n,) increasing s, that begins and ends at rate 0."""
+    """A cubic spline near (n,) angles, rad, at (n,) increasing s, at rate 0 at both ends."""
     from scipy.interpolate import CubicSpline
 
     best, step = None, 1
@@ -123,7 +123,7 @@ def through_angles(times: np.ndarray, angles: np.ndarray, tolerance: float) -> T
     return Trajectory(best.c[::-1].T[:, :, None], np.diff(best.x), float(times[0]))
 
 
-def _ends(count: int) -> np.ndarray:
+def end_rows(count: int) -> np.ndarray:
     """(2m, 2m): the first m derivatives at 0 and at 1, from ascending coefficients."""
     rows = np.zeros((2 * count, 2 * count))
     for order in range(count):
@@ -145,7 +145,8 @@ def _spline(
     times: np.ndarray, points: np.ndarray, degree: int, spans: int, tolerance: float
 ) -> Trajectory | None:
     """The least-squares spline of so many pieces, each with about as many samples; None if it is
-    further from a sample than the tolerance."""
+    further from a sample than the tolerance.
+    """
     from scipy.interpolate import make_lsq_spline
 
     u, scale = _normalised(times)

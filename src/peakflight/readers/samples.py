@@ -166,9 +166,7 @@ def _states(table: Table, columns: dict[str, np.ndarray]) -> np.ndarray:
     return np.stack(states)
 
 
-def _usable(
-    times: np.ndarray, states: np.ndarray, tolerance: float
-) -> tuple[int, tuple[str, ...]]:
+def _usable(times: np.ndarray, states: np.ndarray, tolerance: float) -> tuple[int, tuple[str, ...]]:
     """How many of position and derivatives go with each other; and notes on those that do not.
 
     Each is integrated by the trapezoid rule, corrected by the next where there is one.
