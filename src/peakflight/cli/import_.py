@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,8 +23,11 @@ from peakflight.errors import InvalidProblem
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import METHODS
 from peakflight.readers import TOLERANCE, read_trajectory_file
-from peakflight.result import Plan
+from peakflight.result import JOINT_TOLERANCE, Plan
 from peakflight.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from peakflight.importing import Imported
 
 PLAN_FILE = "plan.json"
 WORDS = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"))
@@ -151,9 +154,12 @@ def import_(
     ]
     if source.fit_errors is not None:
         rows.append(("fit", f"off the samples by {_amounts(source.fit_errors)} at most"))
-    rows.append(("joints", _about_jumps(found.jumps, found.is_rounded, pieces)))
+    rows.append(("joints", _about_joints(found, pieces)))
     if found.moved is not None:
         rows.append(("repair", f"changed it by {_amounts(found.moved)} at most"))
+    if source.yaw is not None:
+        limited = plan.problem.heading is not None and plan.problem.heading.limits
+        rows.append(("yaw", "carried" if limited else "carried; nothing limits it"))
     rows.append(("total time", change(found.file_plan.duration, plan.duration)))
     out.pairs(rows)
     for note in notes:
@@ -177,12 +183,15 @@ def _amounts(values: Any) -> str:
     return ", ".join(parts)
 
 
-def _about_jumps(jumps: Any, is_rounded: bool, pieces: int) -> str:
+def _about_joints(found: "Imported", pieces: int) -> str:
+    """How well the polynomials of the file meet."""
     if pieces == 1:
         return "none"
-    if not is_rounded:
-        return f"jump by up to {_amounts(jumps)}: more than rounded numbers do"
-    return f"jump by up to {_amounts(jumps)}, as rounded numbers do"
+    if found.file_plan.report.joint_residual <= JOINT_TOLERANCE:
+        return f"meet; off by {_amounts(found.jumps)} at most"
+    if found.is_rounded:
+        return f"jump by up to {_amounts(found.jumps)}, as rounded numbers do"
+    return f"jump by up to {_amounts(found.jumps)}, more than rounded numbers do"
 
 
 def _yaw_notes(plan: Plan, off: float) -> list[str]:

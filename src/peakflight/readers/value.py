@@ -9,9 +9,6 @@ from peakflight.errors import InvalidProblem
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 
-DERIVATIVES = ("position", "velocity", "acceleration")
-"""Whose distance from a file of samples is measured; in m, m/s and m/s^2."""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrajectoryFile:
