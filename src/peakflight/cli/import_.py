@@ -121,7 +121,7 @@ def import_(
             with OutputFolder(output) as folder:
                 plan.save(folder.stage / PLAN_FILE)
     jumps = dict(zip((word for word, _ in WORDS), found.jumps.tolist(), strict=True))
-    notes = [*source.notes, *_yaw_notes(plan, found.yaw_off)]
+    notes = [*source.notes, *_jump_notes(found), *_yaw_notes(found.yaw_off)]
     if as_json:
         print_json(
             {
@@ -165,8 +165,6 @@ def import_(
     for note in notes:
         out.line(f"note: {note}")
     print_verdict(out, plan)
-    if not plan.feasible and plan.report.worst <= 1.0 and not repair and method is None:
-        out.line("note: every limit is kept; --repair closes the jumps that are left")
     out.line()
     out.path(
         "nothing written; -o DIR keeps the plan"
@@ -189,15 +187,19 @@ def _about_joints(found: "Imported", pieces: int) -> str:
         return "none"
     if found.file_plan.report.joint_residual <= JOINT_TOLERANCE:
         return f"meet; off by {_amounts(found.jumps)} at most"
-    if found.is_rounded:
-        return f"jump by up to {_amounts(found.jumps)}, as rounded numbers do"
-    return f"jump by up to {_amounts(found.jumps)}, more than rounded numbers do"
+    return f"jump by {_amounts(found.jumps)} at most"
 
 
-def _yaw_notes(plan: Plan, off: float) -> list[str]:
-    notes = []
-    if off > SEEN:
-        notes.append(
-            f"its yaw is up to {math.degrees(off):.2g} deg off the file's, on cubic pieces"
-        )
-    return notes
+def _jump_notes(found: "Imported") -> list[str]:
+    """Where jumps at joints come from, and what can be done."""
+    if found.file_plan.report.joint_residual <= JOINT_TOLERANCE or found.moved is not None:
+        return []
+    if not found.is_rounded:
+        return ["jumps as large as at its joints do not come from rounding; --repair would bend it"]
+    return ["jumps as small as at its joints come from rounded numbers; --repair closes them"]
+
+
+def _yaw_notes(off: float) -> list[str]:
+    if off <= SEEN:
+        return []
+    return [f"its yaw is up to {math.degrees(off):.2g} deg off the file's, on cubic pieces"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from peakflight.errors import InvalidFile
 from peakflight.files import PathLike
-from peakflight.readers.table import SEPARATORS, Table, first_line, read_table
+from peakflight.readers.table import SEPARATORS, Table, opening, read_table
 from peakflight.readers.value import TrajectoryFile
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 
@@ -28,9 +28,9 @@ _TITLE = re.compile(r"(?:p_?)?(x|y|z|yaw)\s*\^\s*(\d{1,3})")
 
 def recognises(text: str) -> bool:
     """Whether the first line names powers, or has as many columns as pieces without a header."""
-    line = first_line(text)
-    if "^" in line:
-        return _TITLE.search(line.lower().replace('"', "")) is not None
+    line, remarks = opening(text)
+    if "^" in line or "^" in remarks:
+        return _TITLE.search(f"{remarks} {line}".lower()) is not None
     separator = next((mark for mark in SEPARATORS if mark in line), None)
     fields = [field for field in line.split(separator) if field.strip()]
     return len(fields) in WIDTHS and fields[0].strip()[:1] in "0123456789.+-"

@@ -75,13 +75,15 @@ def read_table(text: str, path: PathLike) -> Table:
     return Table(titles, values, tuple(number for number, _ in rows), path)
 
 
-def first_line(text: str) -> str:
-    """The first line that holds anything, without its comment mark."""
-    return next((line for line in map(_bare, text.split("\n")) if line), "")
-
-
-def _bare(line: str) -> str:
-    return line.strip().lstrip("#").strip()
+def opening(text: str) -> tuple[str, str]:
+    """The first line with numbers or names, and all comments above it in one."""
+    comments = []
+    for line in text.split("\n"):
+        content, _, comment = line.partition("#")
+        if content.strip():
+            return content.strip(), " ".join(comments)
+        comments.append(comment.strip())
+    return "", " ".join(comments)
 
 
 def _titles(text: str, separator: str | None) -> tuple[tuple[str, str], ...]:
