@@ -23,7 +23,7 @@ from peakflight.errors import InvalidProblem
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import METHODS
 from peakflight.readers import TOLERANCE, read_trajectory_file
-from peakflight.result import JOINT_TOLERANCE, Plan
+from peakflight.result import JOINT_TOLERANCE
 from peakflight.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -77,7 +77,7 @@ def read_table(text: str, path: PathLike) -> Table:
 
 def opening(text: str) -> tuple[str, str]:
     """The first line with numbers or names, and all comments above it in one."""
-    comments = []
+    comments: list[str] = []
     for line in text.split("\n"):
         content, _, comment = line.partition("#")
         if content.strip():
