@@ -1,5 +1,6 @@
 """`peakflight show`: how near drones that fly together come to each other."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 SHOWN = 10
 """Pairs in the table, the nearest first."""
+DIGITS = 7
+"""Decimals of a bound, which is good to 1e-6 m."""
 
 
 def _delays(
@@ -126,7 +129,7 @@ def _print(found: "ClosestApproach", files: tuple[Path, ...]) -> None:
             ("nearest", f"{one} and {two}"),
             ("time", f"{found.time:.4f} s"),
             ("distance", f"{found.distance:.6f} m"),
-            ("proven", f"nowhere below {found.bound:.7f} m"),
+            ("proven", f"nowhere below {_rounded_down(found.bound)} m"),
             ("there", f"({points[0]}) and ({points[1]}) m"),
         ]
     )
@@ -140,7 +143,7 @@ def _print(found: "ClosestApproach", files: tuple[Path, ...]) -> None:
                 _name(files, found.pairs[k, 1]),
                 f"{found.times[k]:.4f}",
                 f"{found.distances[k]:.6f}",
-                f"{found.bounds[k]:.7f}",
+                _rounded_down(found.bounds[k]),
             )
             for k in nearest
         ),
@@ -170,6 +173,11 @@ def _as_dict(found: "ClosestApproach", files: tuple[Path, ...]) -> dict[str, obj
             )
         ],
     }
+
+
+def _rounded_down(bound: float) -> str:
+    """What is still below a bound, to DIGITS decimals."""
+    return f"{math.floor(bound * 10.0**DIGITS) / 10.0**DIGITS:.{DIGITS}f}"
 
 
 def _name(files: tuple[Path, ...], number: int) -> str:
