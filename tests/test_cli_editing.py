@@ -55,13 +55,6 @@ def refused(result: Result, *words: str) -> None:
         assert word in result.stderr
 
 
-@pytest.mark.parametrize("command", ["edit", "import", "show"])
-def test_help_has_an_example(command: str, run: Run) -> None:
-    result = run(command, "--help")
-    assert result.exit_code == 0
-    assert f"peakflight {command} " in result.stdout.split("Example:")[1]
-
-
 class TestEdit:
     def test_verbs_go_in_the_order_given(self, run: Run, made: pf.Plan) -> None:
         first = run("edit", "plan.json", "--rotate", "90", "--move", "1,0,0.5", "-o", "a.json")

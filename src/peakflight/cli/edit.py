@@ -146,7 +146,7 @@ def edit(
 
     \b
     Example:
-      peakflight edit race/plan.json --slow 80% --rotate 90 --move 1,0,0.5 -o new.json
+      peakflight edit plan.json --slow 80% --rotate 90 --move 1,0,0.5 -o new.json
       peakflight edit a.json --join b.json --reverse -o there_and_back.json
     """  # noqa: D301
     steps = _steps(context, verbs)

@@ -97,7 +97,7 @@ def import_(
 
     \b
     Example:
-      peakflight import figure8.csv --limits speed=2,thrust_acceleration=14 --retime -o faster
+      peakflight import eight.csv --limits speed=2,jerk=30 --retime -o new
     """  # noqa: D301
     with Progress() as progress:
         progress.stage(f"reading {file.name}")

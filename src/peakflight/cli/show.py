@@ -79,7 +79,7 @@ def show(
 
     \b
     Example:
-      peakflight show a/plan.json b/plan.json --separation 0.4 --downwash 0.8 --stagger 1
+      peakflight show a.json b.json --separation 0.4 --downwash 0.8 --stagger 1
     """  # noqa: D301
     if len(files) < 2:
         raise click.UsageError("name two plans at least", context)
