@@ -163,3 +163,24 @@ def test_one_plan_or_a_flat_one_is_refused():
     flat = pf.Trajectory([[[0.0, 0.0], [1.0, 1.0]]], [1.0])
     with pytest.raises(pf.InvalidProblem, match="plan 1 has 2 axes"):
         closest_approach([line([0, 0, 0], [1, 0, 0]), flat])
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    angle=st.floats(-4.0, 4.0),
+    offset=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
+    backwards=st.booleans(),
+)
+def test_turned_moved_and_backwards_together_drones_keep_their_distance(angle, offset, backwards):
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    flights = [wandering(5), wandering(6)]
+    longest = max(flight.duration for flight in flights)
+    changed, delays = [], []
+    for flight in flights:
+        other = pf.Trajectory(flight.coefficients @ turn.T, flight.segment_times).translate(offset)
+        changed.append(other.reverse() if backwards else other)
+        delays.append(longest - flight.duration if backwards else 0.0)
+    before = closest_approach(flights, separation=0.4, downwash=0.8)
+    after = closest_approach(changed, separation=0.4, downwash=0.8, delays=delays)
+    assert after.distance == pytest.approx(before.distance, abs=2 * WITHIN)

@@ -337,14 +337,5 @@ def _planned(plan: Plan, method: str) -> Plan:
         else state
         for state in (problem.start, problem.end)
     ]
-    return plan_course(
-        Problem(
-            problem.waypoints,
-            limits=problem.limits,
-            vehicle=problem.vehicle,
-            start=states[0],
-            end=states[1],
-            yaw=problem.heading,
-        ),
-        method=method,
-    )
+    problem = replace(problem, degree=None, continuity=None, start=states[0], end=states[1])
+    return plan_course(problem, method=method)
