@@ -17,6 +17,7 @@ from peakflight.errors import (
 from peakflight.formats import read_course
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem
+from peakflight.readers import TrajectoryFile, read_trajectory, read_trajectory_file
 from peakflight.result import History, Plan, Report
 from peakflight.trajectory import Trajectory
 from peakflight.vehicle import Vehicle
@@ -28,7 +29,10 @@ if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
+    from peakflight.importing import Imported, import_trajectory
+    from peakflight.joining import join
     from peakflight.planner import plan, replan
+    from peakflight.separation import ClosestApproach, closest_approach
     from peakflight.spline import minimum_effort_spline
 
 __all__ = [
@@ -36,10 +40,12 @@ __all__ = [
     "KINDS",
     "VEHICLES",
     "Airframe",
+    "ClosestApproach",
     "Course",
     "FlatStates",
     "Heading",
     "History",
+    "Imported",
     "InvalidFile",
     "InvalidProblem",
     "Limits",
@@ -50,17 +56,23 @@ __all__ = [
     "Report",
     "Status",
     "Trajectory",
+    "TrajectoryFile",
     "Vehicle",
     "__version__",
     "certify",
     "certify_plan",
+    "closest_approach",
     "discretised_bound",
     "find_vehicle",
     "flat_states",
+    "import_trajectory",
+    "join",
     "minimum_effort_spline",
     "plan",
     "planned_states",
     "read_course",
+    "read_trajectory",
+    "read_trajectory_file",
     "replan",
     "states_along",
     "stretch_to_limits",
@@ -68,11 +80,16 @@ __all__ = [
 ]
 
 _LAZY = {
+    "ClosestApproach": "peakflight.separation",
     "FlatStates": "peakflight.flatness",
+    "Imported": "peakflight.importing",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
+    "closest_approach": "peakflight.separation",
     "discretised_bound": "peakflight.bound",
     "flat_states": "peakflight.flatness",
+    "import_trajectory": "peakflight.importing",
+    "join": "peakflight.joining",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
     "planned_states": "peakflight.flatness",

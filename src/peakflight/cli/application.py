@@ -24,10 +24,13 @@ import click
 import peakflight
 from peakflight.cli.check import check
 from peakflight.cli.compare import compare
+from peakflight.cli.edit import edit
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
+from peakflight.cli.show import show
 from peakflight.cli.vehicles import vehicles
 from peakflight.errors import PeakflightError
 
@@ -104,6 +107,9 @@ def application(context: click.Context) -> int:
 application.add_command(plan)
 application.add_command(check)
 application.add_command(compare)
+application.add_command(edit)
+application.add_command(import_)
+application.add_command(show)
 application.add_command(paper)
 application.add_command(vehicles)
 

@@ -1,7 +1,7 @@
 """`peakflight check`: proves a plan again, from its file alone."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,16 +12,13 @@ import numpy as np
 from peakflight.cli.options import common_options, limits_option
 from peakflight.cli.output import (
     Printout,
-    amount,
     attained,
-    number,
     print_json,
-    ranges,
-    ratio_cells,
     rotor_notes,
     seconds,
 )
 from peakflight.cli.progress import Progress
+from peakflight.cli.verdict import COLUMNS, limit_rows
 from peakflight.errors import LONGEST_QUOTE, InvalidFile, Status
 from peakflight.files import read_json
 from peakflight.limits import Limits
@@ -159,8 +156,8 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
             out.line(f"  {problem}")
     out.table(
         "Limits",
-        ("limit", ">allowed", ">reached", ">ratio", ">margin", "", "segments"),
-        _limit_rows(plan, report),
+        COLUMNS,
+        limit_rows(plan, report),
     )
     out.line()
     points = plan.problem.waypoints
@@ -186,16 +183,3 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
     for note in rotor_notes(plan.problem):
         out.line(f"note: {note}")
     out.show()
-
-
-def _limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
-    for kind, limit in plan.problem.allowed.items():
-        worst = float(report.peaks[kind.name].max())
-        reached = attained(plan.problem, kind, worst)
-        yield (
-            kind.label,
-            amount(kind, limit),
-            "" if reached is None else number(kind, reached),
-            *ratio_cells(worst),
-            ranges(report.binding_segments(kind.name)),
-        )
