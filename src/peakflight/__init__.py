@@ -28,6 +28,16 @@ if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
+    from peakflight.flight import (
+        Conditions,
+        Crash,
+        Flight,
+        FlySettings,
+        Spread,
+        SpreadResult,
+        fly,
+        fly_spread,
+    )
     from peakflight.planner import plan, replan
     from peakflight.spline import minimum_effort_spline
 
@@ -36,8 +46,12 @@ __all__ = [
     "KINDS",
     "VEHICLES",
     "Airframe",
+    "Conditions",
     "Course",
+    "Crash",
     "FlatStates",
+    "Flight",
+    "FlySettings",
     "Heading",
     "History",
     "InvalidFile",
@@ -48,6 +62,8 @@ __all__ = [
     "Plan",
     "Problem",
     "Report",
+    "Spread",
+    "SpreadResult",
     "Status",
     "Trajectory",
     "Vehicle",
@@ -57,6 +73,8 @@ __all__ = [
     "discretised_bound",
     "find_vehicle",
     "flat_states",
+    "fly",
+    "fly_spread",
     "minimum_effort_spline",
     "plan",
     "planned_states",
@@ -68,11 +86,19 @@ __all__ = [
 ]
 
 _LAZY = {
+    "Conditions": "peakflight.flight",
+    "Crash": "peakflight.flight",
     "FlatStates": "peakflight.flatness",
+    "Flight": "peakflight.flight",
+    "FlySettings": "peakflight.flight",
+    "Spread": "peakflight.flight",
+    "SpreadResult": "peakflight.flight",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
     "discretised_bound": "peakflight.bound",
     "flat_states": "peakflight.flatness",
+    "fly": "peakflight.flight",
+    "fly_spread": "peakflight.flight",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
     "planned_states": "peakflight.flatness",

@@ -25,6 +25,7 @@ import peakflight
 from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+from peakflight.cli.fly import fly
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
@@ -104,6 +105,7 @@ def application(context: click.Context) -> int:
 application.add_command(plan)
 application.add_command(check)
 application.add_command(compare)
+application.add_command(fly)
 application.add_command(paper)
 application.add_command(vehicles)
 

@@ -1,0 +1,132 @@
+"""A quadrotor as a rigid body: Eq. Quadrotor_model with rotor drag, wind and rotors that lag.
+
+A state is 13 numbers: position, velocity, attitude (unit quaternion w, x, y, z from the body to the
+world) and body rates, at the places that the constants name.
+"""
+
+import math
+
+import numpy as np
+
+from peakflight.kernels.jit import inner
+
+POSITION, VELOCITY, ATTITUDE, RATE, STATE = 0, 3, 6, 10, 13
+
+
+@inner
+def turned(attitude, vector, out):
+    """Out <- a vector of the body, seen from the world."""
+    w, x, y, z = attitude[0], attitude[1], attitude[2], attitude[3]
+    tx = 2.0 * (y * vector[2] - z * vector[1])
+    ty = 2.0 * (z * vector[0] - x * vector[2])
+    tz = 2.0 * (x * vector[1] - y * vector[0])
+    a = vector[0] + w * tx + y * tz - z * ty
+    b = vector[1] + w * ty + z * tx - x * tz
+    c = vector[2] + w * tz + x * ty - y * tx
+    out[0], out[1], out[2] = a, b, c
+
+
+@inner
+def turned_back(attitude, vector, out):
+    """Out <- a vector of the world, seen from the body."""
+    w, x, y, z = attitude[0], -attitude[1], -attitude[2], -attitude[3]
+    tx = 2.0 * (y * vector[2] - z * vector[1])
+    ty = 2.0 * (z * vector[0] - x * vector[2])
+    tz = 2.0 * (x * vector[1] - y * vector[0])
+    a = vector[0] + w * tx + y * tz - z * ty
+    b = vector[1] + w * ty + z * tx - x * tz
+    c = vector[2] + w * tz + x * ty - y * tx
+    out[0], out[1], out[2] = a, b, c
+
+
+@inner
+def product(p, q, out):
+    """Out <- quaternion p q: first the turn q, then p."""
+    w = p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3]
+    x = p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2]
+    y = p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1]
+    z = p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]
+    out[0], out[1], out[2], out[3] = w, x, y, z
+
+
+@inner
+def normalise(quaternion):
+    """Give a quaternion the length 1."""
+    square = 0.0
+    for i in range(4):
+        square += quaternion[i] * quaternion[i]
+    scale = 1.0 / math.sqrt(square)
+    for i in range(4):
+        quaternion[i] *= scale
+
+
+@inner
+def _change(state, thrusts, mass, inertia, wrench, drag, wind, gravity, room, out):
+    """Out <- the derivative of a state; room is (2, 3) of no meaning before or after."""
+    force = 0.0
+    torque = room[1]
+    torque[:] = 0.0
+    for r in range(4):
+        force += thrusts[r] * wrench[r, 0]
+        for d in range(3):
+            torque[d] += thrusts[r] * wrench[r, 1 + d]
+    attitude = state[ATTITUDE:RATE]
+    push = room[0]
+    for d in range(3):
+        push[d] = state[VELOCITY + d] - wind[d]
+    turned_back(attitude, push, push)
+    push[0] *= -drag[0]
+    push[1] *= -drag[0]
+    push[2] = force - drag[1] * push[2]
+    turned(attitude, push, push)
+    for d in range(3):
+        out[POSITION + d] = state[VELOCITY + d]
+        out[VELOCITY + d] = push[d] / mass - gravity * (d == 2)
+    w, x, y, z = attitude[0], attitude[1], attitude[2], attitude[3]
+    p, q, r = state[RATE], state[RATE + 1], state[RATE + 2]
+    out[ATTITUDE] = -0.5 * (x * p + y * q + z * r)
+    out[ATTITUDE + 1] = 0.5 * (w * p + y * r - z * q)
+    out[ATTITUDE + 2] = 0.5 * (w * q + z * p - x * r)
+    out[ATTITUDE + 3] = 0.5 * (w * r + x * q - y * p)
+    out[RATE] = (torque[0] - (inertia[2] - inertia[1]) * q * r) / inertia[0]
+    out[RATE + 1] = (torque[1] - (inertia[0] - inertia[2]) * r * p) / inertia[1]
+    out[RATE + 2] = (torque[2] - (inertia[1] - inertia[0]) * p * q) / inertia[2]
+
+
+@inner
+def step(state, thrusts, commands, lag, time, mass, inertia, wrench, drag, wind, gravity, room):
+    """Move state (13,) and thrusts (4,) on by a time, under constant commands and wind.
+
+    Rotors follow their commands exactly, with the time constant lag; the body by the classical
+    Runge-Kutta rule of fourth order. Room is (9, 13) of no meaning before or after.
+    """
+    half = room[5, :4]
+    after = room[6, :4]
+    left = math.exp(-0.5 * time / lag) if lag > 0.0 else 0.0
+    for r in range(4):
+        begun = thrusts[r] if lag > 0.0 else commands[r]
+        thrusts[r] = begun
+        half[r] = commands[r] + (begun - commands[r]) * left
+        after[r] = commands[r] + (begun - commands[r]) * left * left
+    change, total, trial = room[0], room[1], room[2]
+    vectors = room[7:9, :3]
+    total[:] = 0.0
+    trial[:] = state
+    for stage in range(4):
+        active = thrusts if stage == 0 else (after if stage == 3 else half)
+        _change(trial, active, mass, inertia, wrench, drag, wind, gravity, vectors, change)
+        weight = 1.0 if stage in (0, 3) else 2.0
+        ahead = time if stage == 2 else 0.5 * time
+        for i in range(STATE):
+            total[i] += weight * change[i]
+            trial[i] = state[i] + ahead * change[i]
+    for i in range(STATE):
+        state[i] += time / 6.0 * total[i]
+    normalise(state[ATTITUDE:RATE])
+    thrusts[:] = after
+
+
+@inner
+def workspace():
+    """Room for `step`."""
+    return np.zeros((9, STATE))
