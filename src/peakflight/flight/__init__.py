@@ -3,17 +3,20 @@
 from peakflight.flight.conditions import Conditions
 from peakflight.flight.controllers import FirmwareSettings, GeometricSettings, firmware_settings
 from peakflight.flight.flight import Crash, Flight
+from peakflight.flight.rotors import ROTOR_SPEEDS, RotorSpeeds
 from peakflight.flight.simulate import CONTROLLERS, FlySettings, fly
 from peakflight.flight.spread import Spread, SpreadResult, fly_spread
 
 __all__ = [
     "CONTROLLERS",
+    "ROTOR_SPEEDS",
     "Conditions",
     "Crash",
     "FirmwareSettings",
     "Flight",
     "FlySettings",
     "GeometricSettings",
+    "RotorSpeeds",
     "Spread",
     "SpreadResult",
     "firmware_settings",

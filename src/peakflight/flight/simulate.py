@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from peakflight.flight.controllers import (
 from peakflight.flight.flight import Crash, Flight
 from peakflight.flight.numbers import number, whole
 from peakflight.flight.rehearsal import Rehearsal, rehearse
+from peakflight.flight.rotors import ROTOR_SPEEDS, RotorSpeeds, rotors_of
 from peakflight.kernels import controllers as rows
 from peakflight.kernels import flight as kernels
 from peakflight.kernels import jit
@@ -70,6 +71,9 @@ class FlySettings:
     geometric: GeometricSettings = field(default_factory=GeometricSettings)
     firmware: FirmwareSettings | None = None
     """None for `firmware_settings` of the vehicle."""
+    rotors: RotorSpeeds | Literal["identified", "lag"] = "identified"
+    """How rotors follow: by the speeds that were identified for the vehicle, where they were
+    (`ROTOR_SPEEDS`, the Crazyflies); by the vehicle's lag alone; or as given."""
 
     def __post_init__(self) -> None:
         for name, least, most, unit in (
@@ -84,6 +88,16 @@ class FlySettings:
             object.__setattr__(self, name, whole(name, getattr(self, name), 1, 1000))
         if self.ground is not None:
             object.__setattr__(self, "ground", number("ground", self.ground, -1e6, 1e6, "m"))
+        if not (isinstance(self.rotors, RotorSpeeds) or self.rotors in ("identified", "lag")):
+            raise InvalidProblem(
+                f"rotors is {quoted(str(self.rotors))}; it must be identified, lag or RotorSpeeds"
+            )
+
+    def speeds(self, vehicle: Vehicle) -> RotorSpeeds | None:
+        """How the rotors of a vehicle follow; None for its lag."""
+        if isinstance(self.rotors, RotorSpeeds):
+            return self.rotors
+        return ROTOR_SPEEDS.get(vehicle.name) if self.rotors == "identified" else None
 
 
 def fly(
@@ -256,7 +270,7 @@ def run(task: Task, conditions: Conditions) -> Outcome:
     noise = np.random.default_rng(conditions.seed).standard_normal((count, kernels.NOISE))
     late = min(round(conditions.latency * settings.control_rate), len(task.planned))
     kind, every, parts = CONTROLLERS[task.controller], settings.position_divider, settings.parts
-    lag = vehicle.motor_lag * conditions.motor_lag_scale
+    rotors = rotors_of(vehicle, settings.speeds(vehicle), conditions.motor_lag_scale)
     mass, gravity = vehicle.mass * conditions.mass_scale, GRAVITY
     model_mass, spool = vehicle.mass, settings.geometric.spool
     if vehicle.motor_lag == 0.0:
@@ -270,7 +284,7 @@ def run(task: Task, conditions: Conditions) -> Outcome:
             jit.fresh(task.planned),
             pause,
             parts,
-            lag,
+            rotors,
             mass,
             jit.fresh(np.multiply(vehicle.inertia, conditions.inertia_scale)),
             jit.fresh(wrench_of(vehicle, conditions)),

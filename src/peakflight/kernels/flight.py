@@ -36,7 +36,7 @@ FASTEST = 1e6
 
 @kernel
 def open_loop(
-    start, thrusts, commands, time, parts, lag, mass, inertia, wrench, drag, wind, gravity
+    start, thrusts, commands, time, parts, rotors, mass, inertia, wrench, drag, wind, gravity
 ):
     """States (n+1, 13) and thrusts (n+1, 4) under (n, 4) commands, each held for a time.
 
@@ -50,7 +50,7 @@ def open_loop(
     for i in range(count):
         for _ in range(parts):
             step(
-                state, now, commands[i], lag, time / parts, mass, inertia, wrench, drag, wind,
+                state, now, commands[i], rotors, time / parts, mass, inertia, wrench, drag, wind,
                 gravity, room,
             )  # fmt: skip
         states[i + 1], flown[i + 1] = state, now
@@ -59,7 +59,7 @@ def open_loop(
 
 @kernel
 def closed_loop(
-    start, thrusts, planned, time, parts, lag, mass, inertia, wrench, drag, wind, gravity,
+    start, thrusts, planned, time, parts, rotors, mass, inertia, wrench, drag, wind, gravity,
     ranges, kind, gains, model_mass, model_inertia, mixer, spool, force_scale, moments, every,
     late, noise, deviations, gust, memory, bounds,
 ):  # fmt: skip
@@ -73,8 +73,8 @@ def closed_loop(
         (n, 20) rows of what is planned, a time apart; the controller runs at each.
     parts
         Steps of integration in that time.
-    lag, mass, inertia, wrench, drag, wind, gravity
-        Of the true vehicle; wrench (4, 4) is force and torques of each rotor for a thrust of 1.
+    rotors, mass, inertia, wrench, drag, wind, gravity
+        Of the true vehicle; rotors (8,) as `spin` takes them, wrench (4, 4) is force and torques of each rotor for a thrust of 1.
     ranges
         (2, 2) least and most thrust of a rotor as it is, and as the controller knows it.
     kind, gains
@@ -145,7 +145,7 @@ def closed_loop(
         saturated += clipped
         for _ in range(parts):
             step(
-                state, now, commands, lag, time / parts, mass, inertia, wrench, drag, air, gravity,
+                state, now, commands, rotors, time / parts, mass, inertia, wrench, drag, air, gravity,
                 room,
             )  # fmt: skip
     return states, flown, count, saturated, FLEW
