@@ -12,6 +12,7 @@ from peakflight.result import Plan
 
 if TYPE_CHECKING:
     from peakflight.flight import Conditions, Flight, SpreadResult
+    from peakflight.flight.spread import SpreadFlight
 
 SUMMARIES = {
     "flight.npz": "every sample, for peakflight.Flight.load",
@@ -46,7 +47,7 @@ def write_files(
     names = ["flight.npz", "flight.csv", "flight.html"]
     flight.save(folder / names[0])
     write_flight_samples(flight, folder / names[1])
-    write_animation(flight, folder / names[2], waypoints=plan.problem.waypoints)
+    write_animation(flight, folder / names[2], plan=plan)
     if find_spec("matplotlib") is None:
         return names
     on_stage("drawing")
@@ -54,7 +55,7 @@ def write_files(
     from peakflight.figures.flight import flight_error_figure, flight_path_figure, spread_figure
 
     figures = {
-        "flight_path.png": flight_path_figure(flight, plan.problem.waypoints),
+        "flight_path.png": flight_path_figure(flight, plan),
         "flight_error.png": flight_error_figure(flight),
     }
     if spread is not None:
@@ -150,7 +151,7 @@ def _print_spread(out: Printout, spread: "SpreadResult") -> None:
         rows.append(("crashes", f"{sum(spread.crashes.values())}: {told}"))
     if rows:
         out.pairs(rows)
-    columns = ("worst", *(f">{label}" for label in LABELS.values()), ">latency ms", ">RMS m", "")
+    columns = ("", *(f">{label}" for label in LABELS.values()), ">late ms", ">RMS m", "end")
     out.table("Worst of them", columns, _worst_rows(spread))
 
 
@@ -161,8 +162,12 @@ def _worst_rows(spread: "SpreadResult") -> Iterator[Sequence[str]]:
             *(f"{getattr(one.conditions, name):.3f}" for name in LABELS),
             f"{1e3 * one.conditions.latency:.1f}",
             f"{one.rms_error:.4f}",
-            f"{one.crash} at {one.flown:.2f} s" if one.crash else "flew",
+            _end(one),
         )
+
+
+def _end(one: "SpreadFlight") -> str:
+    return "flew" if one.crash is None else f"{one.crash}, {one.flown:.2f} s"
 
 
 def _told(conditions: "Conditions") -> str:

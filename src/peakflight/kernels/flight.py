@@ -74,7 +74,8 @@ def closed_loop(
     parts
         Steps of integration in that time.
     rotors, mass, inertia, wrench, drag, wind, gravity
-        Of the true vehicle; rotors (8,) as `spin` takes them, wrench (4, 4) is force and torques of each rotor for a thrust of 1.
+        Of the true vehicle; rotors (8,) as `spin` takes them, wrench (4, 4) is force and torques
+        of each rotor for a thrust of 1.
     ranges
         (2, 2) least and most thrust of a rotor as it is, and as the controller knows it.
     kind, gains
@@ -145,8 +146,8 @@ def closed_loop(
         saturated += clipped
         for _ in range(parts):
             step(
-                state, now, commands, rotors, time / parts, mass, inertia, wrench, drag, air, gravity,
-                room,
+                state, now, commands, rotors, time / parts, mass, inertia, wrench, drag, air,
+                gravity, room,
             )  # fmt: skip
     return states, flown, count, saturated, FLEW
 
