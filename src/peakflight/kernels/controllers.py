@@ -6,7 +6,7 @@ velocity; the thrust vector, N; yaw; attitude, body rates and angular accelerati
 
 import math
 
-from peakflight.kernels.jit import inner
+from peakflight.kernels.jit import within
 from peakflight.kernels.rigid_body import (
     ATTITUDE,
     POSITION,
@@ -35,7 +35,7 @@ NOTHING = 1e-9
 """A vector this short has no direction, N."""
 
 
-@inner
+@within
 def geometric(state, planned, mass, inertia, gains, room, wrench):
     """Wrench (4,) <- thrust and torques of a tracker on SE(3): Lee, Leok and McClamroch 2010.
 
@@ -73,7 +73,7 @@ def geometric(state, planned, mass, inertia, gains, room, wrench):
         wrench[1 + d] = inertia[d] * wanted_turn + (inertia[f] - inertia[e]) * p * q
 
 
-@inner
+@within
 def _shortest_turn(axis, force, length, out):
     """Out <- the quaternion of the shortest turn from a unit axis to a force."""
     cosine = (axis[0] * force[0] + axis[1] * force[1] + axis[2] * force[2]) / length
@@ -87,7 +87,7 @@ def _shortest_turn(axis, force, length, out):
     normalise(out)
 
 
-@inner
+@within
 def share_out(wrench, mixer, least, most, commands):
     """Commands (4,) <- thrusts of rotors within their range; whether the range was in the way.
 
@@ -116,7 +116,7 @@ def share_out(wrench, mixer, least, most, commands):
     return scale < 1.0 or kept != base or share < 1.0
 
 
-@inner
+@within
 def firmware(state, planned, gains, force_scale, moments, outer, time, pause, held, room, thrusts):
     """Thrusts (4,) <- what the Crazyflie's controller_mellinger.c asks of the rotors, unbounded.
 
@@ -185,7 +185,7 @@ def firmware(state, planned, gains, force_scale, moments, outer, time, pause, he
                 thrusts[r] += moments[r, d] * moment
 
 
-@inner
+@within
 def _with_yaw(force, length, yaw, out):
     """Out <- the attitude with z along a force and y across (cos yaw, sin yaw, 0), as Mellinger."""
     zx, zy, zz = force[0] / length, force[1] / length, force[2] / length
@@ -199,7 +199,7 @@ def _with_yaw(force, length, yaw, out):
     _from_axes(xx, xy, xz, yx, yy, yz, zx, zy, zz, out)
 
 
-@inner
+@within
 def _from_axes(xx, xy, xz, yx, yy, yz, zx, zy, zz, out):
     """Out <- the quaternion of a frame, from its largest part for the sake of digits."""
     trace = xx + yy + zz

@@ -13,7 +13,7 @@ from peakflight.kernels.controllers import (
     geometric,
     share_out,
 )
-from peakflight.kernels.jit import inner, kernel
+from peakflight.kernels.jit import kernel, within
 from peakflight.kernels.rigid_body import (
     ATTITUDE,
     POSITION,
@@ -152,7 +152,7 @@ def closed_loop(
     return states, flown, count, saturated, FLEW
 
 
-@inner
+@within
 def _verdict(state, planned, bounds, board):
     """Whether this is still a flight."""
     square = 0.0
@@ -175,7 +175,7 @@ def _verdict(state, planned, bounds, board):
     return FLEW
 
 
-@inner
+@within
 def _disturb(measured, noise, deviations, board):
     """Add noise to a measured state."""
     turn = board[0]

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from peakflight.kernels.jit import inner
+from peakflight.kernels.jit import inner, within
 
 POSITION, VELOCITY, ATTITUDE, RATE, STATE = 0, 3, 6, 10, 13
 LAG, RISE, FALL, LINEAR, TOP, MOMENTUM, ROTOR = 0, 1, 3, 5, 6, 7, 8
@@ -64,7 +64,7 @@ def normalise(quaternion):
         quaternion[i] *= scale
 
 
-@inner
+@within
 def _change(
     state, thrusts, momentum, reaction, mass, inertia, wrench, drag, wind, gravity, room, out
 ):
