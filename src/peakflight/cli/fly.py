@@ -96,8 +96,8 @@ def fly(
 
     \b
     Example:
-      peakflight fly course-plan/plan.json --vehicle crazyflie-2.1-upgrade -o flight
-      peakflight fly course-plan/plan.json --controller firmware --spread 200 --error 0.15
+      peakflight fly course-plan/plan.json --vehicle racing-quad -o flight
+      peakflight fly course-plan/plan.json --controller firmware --spread 200
     """  # noqa: D301
     with Progress() as progress:
         progress.stage(f"reading {file.name}")

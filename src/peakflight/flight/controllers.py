@@ -1,5 +1,6 @@
 """What the two controllers are set to, and the numbers that their kernels take."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -9,13 +10,16 @@ import numpy as np
 from peakflight.errors import InvalidProblem
 from peakflight.flight.numbers import number, vector
 from peakflight.kernels import controllers as kernels
-from peakflight.vehicle import Vehicle
+from peakflight.limits import GRAVITY
+from peakflight.vehicle import ROTORS, Vehicle
 from peakflight.vehicles import VEHICLES
 
 PWM = 65535.0
 """Full throttle in the units of the firmware: 16 bits."""
 LARGEST = 1e9
 """Gain."""
+LEAST_TURNING = 1.0
+"""rad/s^2, for a vehicle whose rotors have nothing to spare."""
 STOCK = "crazyflie-2.1"
 """The vehicle that the firmware's gains are for."""
 STOCK_MASS = 0.029
@@ -49,6 +53,9 @@ class GeometricSettings:
     """Of both loops, relative to critical."""
     separation: float = 4.0
     """Attitude bandwidth over position bandwidth."""
+    reach: float = 0.35
+    """Attitude error at which the rotors of a hovering vehicle come to an end of their range, at
+    least, rad: faster, a heavy vehicle swings from one end to the other until it tumbles."""
     yaw_share: float = 0.5
     """Bandwidth of the yaw over that of the tilt: rotors turn the vehicle about z with less."""
 
@@ -63,6 +70,7 @@ class GeometricSettings:
         """(11, 3) rows of `peakflight.kernels.controllers`."""
         left = self.spool * vehicle.motor_lag
         bandwidth = self.fastest if left == 0.0 else min(self.fastest, self.lag_share / left)
+        bandwidth = min(bandwidth, math.sqrt(_turning(vehicle) / self.reach))
         slow = bandwidth / self.separation
         turn = bandwidth * np.array([1.0, 1.0, self.yaw_share])
         gains = np.zeros((kernels.GAINS, 3))
@@ -185,6 +193,15 @@ def firmware_settings(vehicle: Vehicle) -> FirmwareSettings:
         km=_times(default.km, slower),
         kdw=_times(default.kdw, slower),
     )
+
+
+def _turning(vehicle: Vehicle) -> float:
+    """Angular acceleration across z that the rotors of a hovering vehicle have to spare, rad/s^2."""
+    least, most = vehicle.rotor_thrust
+    hovering = vehicle.mass * GRAVITY / ROTORS
+    spare = min(most - hovering, hovering - least)
+    torques = spare / np.abs(vehicle.mixer[:, 1:3]).max(axis=0)
+    return max(float((torques / vehicle.inertia[:2]).min()), LEAST_TURNING)
 
 
 def _times(
