@@ -196,7 +196,7 @@ def firmware_settings(vehicle: Vehicle) -> FirmwareSettings:
 
 
 def _turning(vehicle: Vehicle) -> float:
-    """Angular acceleration across z that the rotors of a hovering vehicle have to spare, rad/s^2."""
+    """Angular acceleration across z that rotors of a hovering vehicle can spare, rad/s^2."""
     least, most = vehicle.rotor_thrust
     hovering = vehicle.mass * GRAVITY / ROTORS
     spare = min(most - hovering, hovering - least)
