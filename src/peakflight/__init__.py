@@ -29,6 +29,16 @@ if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
+    from peakflight.flight import (
+        Conditions,
+        Crash,
+        Flight,
+        FlySettings,
+        Spread,
+        SpreadResult,
+        fly,
+        fly_spread,
+    )
     from peakflight.importing import Imported, import_trajectory
     from peakflight.joining import join
     from peakflight.planner import plan, replan
@@ -41,8 +51,12 @@ __all__ = [
     "VEHICLES",
     "Airframe",
     "ClosestApproach",
+    "Conditions",
     "Course",
+    "Crash",
     "FlatStates",
+    "Flight",
+    "FlySettings",
     "Heading",
     "History",
     "Imported",
@@ -54,6 +68,8 @@ __all__ = [
     "Plan",
     "Problem",
     "Report",
+    "Spread",
+    "SpreadResult",
     "Status",
     "Trajectory",
     "TrajectoryFile",
@@ -65,6 +81,8 @@ __all__ = [
     "discretised_bound",
     "find_vehicle",
     "flat_states",
+    "fly",
+    "fly_spread",
     "import_trajectory",
     "join",
     "minimum_effort_spline",
@@ -81,13 +99,21 @@ __all__ = [
 
 _LAZY = {
     "ClosestApproach": "peakflight.separation",
+    "Conditions": "peakflight.flight",
+    "Crash": "peakflight.flight",
     "FlatStates": "peakflight.flatness",
+    "Flight": "peakflight.flight",
+    "FlySettings": "peakflight.flight",
     "Imported": "peakflight.importing",
+    "Spread": "peakflight.flight",
+    "SpreadResult": "peakflight.flight",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
     "closest_approach": "peakflight.separation",
     "discretised_bound": "peakflight.bound",
     "flat_states": "peakflight.flatness",
+    "fly": "peakflight.flight",
+    "fly_spread": "peakflight.flight",
     "import_trajectory": "peakflight.importing",
     "join": "peakflight.joining",
     "minimum_effort_spline": "peakflight.spline",

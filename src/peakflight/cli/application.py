@@ -26,6 +26,7 @@ from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.edit import edit
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+from peakflight.cli.fly import fly
 from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
@@ -110,6 +111,7 @@ application.add_command(compare)
 application.add_command(edit)
 application.add_command(import_)
 application.add_command(show)
+application.add_command(fly)
 application.add_command(paper)
 application.add_command(vehicles)
 
