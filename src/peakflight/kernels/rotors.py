@@ -8,7 +8,7 @@ rotor thrusts are limited by |F| + c |alpha|, from above, and by g - |F| + c |al
 where the least of them is small. There is no polynomial whose maximum these are: norms are added.
 
 On an interval every component of F, j and s lies within a radius of a line, and arithmetic on such
-lines (`_times`, `_inverse`) gives a line and a radius for every component of alpha. Norms are
+lines (`kernels.lines`) gives a line and a radius for every component of alpha. Norms are
 convex: that of a line lies below its chord, and |F| above its part along any direction, which is
 linear again. So the largest of two ends plus the radii is a bound, and what it is above the truth
 falls with the square of the interval's length. Subdivision closes it as in `turning`. Rounding is
@@ -19,6 +19,7 @@ import numpy as np
 
 from peakflight.kernels.bernstein import EPSILON, control_points
 from peakflight.kernels.jit import inner
+from peakflight.kernels.lines import ROUNDED, dot, drawn, inverse, keep, line, plus, times
 from peakflight.kernels.turning import DEPTH, NESTING, motion_at, split
 
 SPLITS = 2000
@@ -33,8 +34,6 @@ REFINEMENTS, LOOKS, CLOSER = 6, 3, 0.3
 they are each time."""
 SMALLEST = 1e-290
 """What underflows is not zero: added to bounds."""
-ROUNDED = 8.0 * EPSILON
-"""Rounding of a line, relative to the sizes of what it was made of; and of a radius."""
 
 
 def workspace(degree: int, reach: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -79,7 +78,7 @@ def largest_demand(
         waiting -= 1
         nesting = ends[waiting, 2]
         bound = np.inf
-        if _draw(stack, waiting, degree, errors, sizes, nesting, lines):
+        if draw(stack, waiting, degree, errors, sizes, nesting, lines):
             bound = _bound(sign, lines, reach[0], gravity)
         size = max(low, limit)
         gap = bound - max(
@@ -157,43 +156,33 @@ def _demand(sign, point, reach, gravity, lift):
 
 
 @inner
-def _draw(stack, row, degree, errors, sizes, nesting, lines):
+def draw(stack, row, degree, errors, sizes, nesting, lines):
     """Lines <- centre, slope and radius of each component of F, j, s and alpha on an interval.
 
     The slope is by a variable from -1 to 1. Returns whether there is thrust all along: without it
     alpha is not drawn.
     """
     for c in range(9):
-        first = stack[row, 0, c]
-        last = stack[row, degree, c]
-        below = 0.0
-        above = 0.0
-        for i in range(1, degree):
-            off = stack[row, i, c] - (first + i * (last - first) / degree)
-            below = min(below, off)
-            above = max(above, off)
         vector = c // 3
         # each subdivision rounds `degree` sums, by half an EPSILON of the size
         lost = errors[vector] + (degree * nesting + 16.0) * EPSILON * sizes[vector]
-        lines[c, 0] = 0.5 * (first + last) + 0.5 * (below + above)
-        lines[c, 1] = 0.5 * (last - first)
-        lines[c, 2] = 0.5 * (above - below) + lost
-    square = _dot(lines, 0, 0)
-    inverse = _inverse(square)
-    if not inverse[2] < np.inf:
+        keep(lines, c, drawn(stack, row, c, degree, lost))
+    square = dot(lines, 0, 0)
+    share = inverse(square)
+    if not share[2] < np.inf:
         return False
-    twice = _times(_dot(lines, 0, 3), inverse)
+    twice = times(dot(lines, 0, 3), share)
     twice = (-2.0 * twice[0], -2.0 * twice[1], 2.0 * twice[2])
     for d in range(3):  # s - 2 (F.j / F.F) j, in place of s
-        swing = _plus(_line(lines, 6 + d), _times(twice, _line(lines, 3 + d)))
-        _keep(lines, 6 + d, swing)
+        swing = plus(line(lines, 6 + d), times(twice, line(lines, 3 + d)))
+        keep(lines, 6 + d, swing)
     for d in range(3):
         e = (d + 1) % 3
         f = (d + 2) % 3
-        one = _times(_line(lines, e), _line(lines, 6 + f))
-        other = _times(_line(lines, f), _line(lines, 6 + e))
-        turn = _plus(one, (-other[0], -other[1], other[2]))
-        _keep(lines, 9 + d, _times(turn, inverse))
+        one = times(line(lines, e), line(lines, 6 + f))
+        other = times(line(lines, f), line(lines, 6 + e))
+        turn = plus(one, (-other[0], -other[1], other[2]))
+        keep(lines, 9 + d, times(turn, share))
     return True
 
 
@@ -231,63 +220,3 @@ def _bound(sign, lines, reach, gravity):
     bound += np.sqrt(thrust_radius) + reach * np.sqrt(turn_radius)
     bound = bound * (1.0 + ROUNDED) + 2.0 * ROUNDED * size + SMALLEST
     return np.inf if np.isnan(bound) else bound
-
-
-@inner
-def _line(lines, row):
-    return lines[row, 0], lines[row, 1], lines[row, 2]
-
-
-@inner
-def _keep(lines, row, line):
-    for i in range(3):
-        lines[row, i] = line[i]
-
-
-@inner
-def _dot(lines, one, other):
-    x = _times(_line(lines, one), _line(lines, other))
-    y = _times(_line(lines, one + 1), _line(lines, other + 1))
-    z = _times(_line(lines, one + 2), _line(lines, other + 2))
-    return _plus(_plus(x, y), z)
-
-
-@inner
-def _plus(one, other):
-    """Sum of two quantities that lie within a radius of a line each."""
-    size = abs(one[0]) + abs(one[1]) + abs(other[0]) + abs(other[1])
-    radius = one[2] + other[2] + ROUNDED * size
-    return one[0] + other[0], one[1] + other[1], radius * (1.0 + ROUNDED)
-
-
-@inner
-def _times(one, other):
-    """Product; the square of the variable is from 0 to 1: half of it joins the centre."""
-    one_size = abs(one[0]) + abs(one[1])
-    other_size = abs(other[0]) + abs(other[1])
-    bow = 0.5 * one[1] * other[1]
-    radius = (
-        abs(bow) + one_size * other[2] + other_size * one[2] + one[2] * other[2]
-        + ROUNDED * one_size * other_size
-    )  # fmt: skip
-    return (
-        one[0] * other[0] + bow,
-        one[0] * other[1] + one[1] * other[0],
-        radius * (1.0 + ROUNDED),
-    )
-
-
-@inner
-def _inverse(line):
-    """One over a positive quantity; of infinite radius if it may vanish.
-
-    1 / (c + d) = 1/c - d/c^2 + d^2 / (c^2 (c + d)), of which the last is positive.
-    """
-    off = (abs(line[1]) + line[2]) * (1.0 + ROUNDED)
-    least = line[0] * (1.0 - ROUNDED) - off
-    if not least > 0.0:
-        return 0.0, 0.0, np.inf
-    inverse = 1.0 / line[0]
-    rest = 0.5 * (off * inverse) * (off * inverse) / least
-    radius = rest + line[2] * inverse * inverse + ROUNDED * (inverse + rest)
-    return inverse + rest, -line[1] * inverse * inverse, radius * (1.0 + ROUNDED)
