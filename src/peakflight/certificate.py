@@ -18,6 +18,7 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
+from peakflight.twist_certificate import certify_twist
 from peakflight.yaw_certificate import certify_yaw
 
 JUMP_OF_LIMIT = 1e-4
@@ -136,6 +137,13 @@ def certify_answer(
     counts = (1,) * len(trajectory) if pieces is None else pieces
     passed = trajectory.breakpoints[np.concatenate(([0], np.cumsum(counts)))]
     peaks, problems = certify_yaw(problem.heading, yaw, trajectory, passed)
+    if problem.heading.is_about_body or problem.limits.on_rotors:
+        twisted, exceeding = certify_twist(problem.heading, problem.limits, yaw, trajectory)
+        twisted = {  # of limits on rotors, what holds without twisting is proven as well
+            name: np.maximum(kappa, report.peaks.get(name, kappa))
+            for name, kappa in twisted.items()
+        }
+        peaks, problems = peaks | twisted, problems + exceeding
     return replace(
         report,
         feasible=report.feasible and not problems,

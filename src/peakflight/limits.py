@@ -9,12 +9,12 @@ Rotor thrusts follow from the motion and the airframe, for the worst heading. Wi
 angular acceleration alpha of its direction and the airframe's reach c, every rotor of a vehicle of
 mass m that does not twist about its thrust, with equal inertias about roll and pitch and no drag,
 gives between m (|F| - c |alpha|) / 4 and m (|F| + c |alpha|) / 4. A yaw that is held or steered
-twists the vehicle, which takes more.
+twists the vehicle, which takes more: `twist_certificate` proves that.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -175,6 +175,11 @@ class Limits:
             return None
         return np.array([self.airframe.reach])
 
+    @property
+    def can_steer(self) -> bool:
+        """Whether the airframe says what turning about its z axis takes."""
+        return self.airframe is not None and self.airframe.can_steer
+
     def as_array(self) -> np.ndarray:
         """What kernels hold kinds to, shape (len(KINDS),); NaN where nothing is limited.
 
@@ -226,7 +231,7 @@ class Limits:
         """The limits that are set, by name, and the airframe if there is one."""
         values: dict[str, Any] = {kind.name: getattr(self, kind.name) for kind in self.active}
         if self.airframe is not None:
-            values["airframe"] = asdict(self.airframe)
+            values["airframe"] = self.airframe.to_dict()
         return values
 
     @classmethod

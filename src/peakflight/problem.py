@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self, TypeAlias
 
@@ -177,10 +177,10 @@ class Problem:
         spline_class = self.spline_class
         if self.yaw is not None:
             object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
-            if self.limits.on_rotors:
+            if self.limits.on_rotors and not self.limits.can_steer:
                 raise InvalidProblem(
-                    "limits on rotors are proven for a heading that does not twist about the "
-                    "thrust; leave yaw out, or limit thrust and angular acceleration instead"
+                    "a yaw beside limits on rotors needs yaw_inertia and torque_per_thrust of the "
+                    "airframe"
                 )
         rest = spline_class.end_orders
         for name in ("start", "end"):
@@ -221,11 +221,19 @@ class Problem:
 
     @cached_property
     def heading(self) -> Heading | None:
-        """What is asked of the yaw; of an array, to pass it without limits. None for nothing."""
-        if self.yaw is None or isinstance(self.yaw, Heading):
-            return self.yaw
+        """What is asked of the yaw; of an array, to pass it without limits. None for nothing.
+
+        Where rotor thrust is limited, a nose about which nothing is said is free, and limits that
+        are not said to be about the yaw are about the body.
+        """
+        rotors = self.limits.on_rotors and self.limits.can_steer
+        if self.yaw is None:
+            return Heading(policy="free", rate=None, acceleration=None) if rotors else None
+        if isinstance(self.yaw, Heading):
+            return replace(self.yaw, about="body") if rotors and not self.yaw.about else self.yaw
         angles = tuple(np.asarray(self.yaw).tolist())
-        return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None)
+        about = "body" if rotors else None
+        return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None, about=about)
 
     @cached_property
     def allowed(self) -> dict[LimitKind, float]:

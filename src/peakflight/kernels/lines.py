@@ -93,3 +93,57 @@ def inverse(line):
     rest = 0.5 * (off * value) * (off * value) / least
     radius = rest + line[2] * value * value + ROUNDED * (value + rest)
     return value + rest, -line[1] * value * value, radius * (1.0 + ROUNDED)
+
+
+@inner
+def inverse_root(line):
+    """One over the square root of a positive quantity; of infinite radius if it may vanish.
+
+    1 / sqrt(c + d) = (1 - d / (2c)) / sqrt(c) and a rest from 0 to 3/8 (d/c)^2 sqrt(c^4 / least^5).
+    """
+    off = (abs(line[1]) + line[2]) * (1.0 + ROUNDED)
+    least = line[0] * (1.0 - ROUNDED) - off
+    if not least > 0.0:
+        return 0.0, 0.0, np.inf
+    value = 1.0 / np.sqrt(line[0])
+    share = line[0] / least
+    rest = 0.1875 * (off / line[0]) * (off / line[0]) * share * share * np.sqrt(share) * value
+    slope = -0.5 * line[1] * value / line[0]
+    radius = rest + 0.5 * line[2] * value / line[0] + ROUNDED * (value + rest)
+    return value + rest, slope, radius * (1.0 + ROUNDED)
+
+
+@inner
+def negative(line):
+    """A quantity with the other sign."""
+    return -line[0], -line[1], line[2]
+
+
+@inner
+def cross(lines, one, other, out):
+    """Rows from `out` on <- the vector product of the vectors in three rows each."""
+    for d in range(3):
+        e = (d + 1) % 3
+        f = (d + 2) % 3
+        ahead = times(line(lines, one + e), line(lines, other + f))
+        behind = times(line(lines, one + f), line(lines, other + e))
+        keep(lines, out + d, plus(ahead, negative(behind)))
+
+
+@inner
+def end_norm(lines, row, way):
+    """Norm of the vector in three rows at one end of its lines (way 1 or -1), without the radii."""
+    total = 0.0
+    for d in range(3):
+        end = lines[row + d, 0] + way * lines[row + d, 1]
+        total += end * end
+    return np.sqrt(total)
+
+
+@inner
+def thickness(lines, row):
+    """Norm of the radii of the vector in three rows."""
+    total = 0.0
+    for d in range(3):
+        total += lines[row + d, 2] * lines[row + d, 2]
+    return np.sqrt(total)

@@ -19,7 +19,19 @@ import numpy as np
 
 from peakflight.kernels.bernstein import EPSILON, control_points
 from peakflight.kernels.jit import inner
-from peakflight.kernels.lines import ROUNDED, dot, drawn, inverse, keep, line, plus, times
+from peakflight.kernels.lines import (
+    ROUNDED,
+    cross,
+    dot,
+    drawn,
+    end_norm,
+    inverse,
+    keep,
+    line,
+    plus,
+    thickness,
+    times,
+)
 from peakflight.kernels.turning import DEPTH, NESTING, motion_at, split
 
 SPLITS = 2000
@@ -176,47 +188,36 @@ def draw(stack, row, degree, errors, sizes, nesting, lines):
     for d in range(3):  # s - 2 (F.j / F.F) j, in place of s
         swing = plus(line(lines, 6 + d), times(twice, line(lines, 3 + d)))
         keep(lines, 6 + d, swing)
+    cross(lines, 0, 6, 9)
     for d in range(3):
-        e = (d + 1) % 3
-        f = (d + 2) % 3
-        one = times(line(lines, e), line(lines, 6 + f))
-        other = times(line(lines, f), line(lines, 6 + e))
-        turn = plus(one, (-other[0], -other[1], other[2]))
-        keep(lines, 9 + d, times(turn, share))
+        keep(lines, 9 + d, times(line(lines, 9 + d), share))
     return True
 
 
 @inner
 def _bound(sign, lines, reach, gravity):
     """Upper bound of what is limited, from the lines of F and alpha."""
-    thrust_radius = 0.0
-    turn_radius = 0.0
-    centre = 0.0
-    for d in range(3):
-        thrust_radius += lines[d, 2] * lines[d, 2]
-        turn_radius += lines[9 + d, 2] * lines[9 + d, 2]
-        centre += lines[d, 0] * lines[d, 0]
-    centre = np.sqrt(centre) * (1.0 + ROUNDED)
+    centre = np.sqrt(lines[0, 0] ** 2 + lines[1, 0] ** 2 + lines[2, 0] ** 2) * (1.0 + ROUNDED)
     bound = -np.inf
     size = gravity
     for side in range(2):
         way = 2.0 * side - 1.0
-        thrust = 0.0
-        turn = 0.0
-        along = 0.0
-        for d in range(3):
-            end = lines[d, 0] + way * lines[d, 1]
-            thrust += end * end
-            along += lines[d, 0] * end
-            end = lines[9 + d, 0] + way * lines[9 + d, 1]
-            turn += end * end
-        thrust = np.sqrt(thrust)
-        turn = reach * np.sqrt(turn)
+        thrust = end_norm(lines, 0, way)
+        turn = reach * end_norm(lines, 9, way)
         size = max(size, gravity + thrust + turn)
         if sign > 0.0:
             bound = max(bound, thrust + turn)
         else:
-            bound = max(bound, gravity - along / centre + turn)
-    bound += np.sqrt(thrust_radius) + reach * np.sqrt(turn_radius)
+            bound = max(bound, gravity - along(lines, way) / centre + turn)
+    bound += thickness(lines, 0) + reach * thickness(lines, 9)
     bound = bound * (1.0 + ROUNDED) + 2.0 * ROUNDED * size + SMALLEST
     return np.inf if np.isnan(bound) else bound
+
+
+@inner
+def along(lines, way):
+    """F at one end of its lines, along its centre, times the size of that."""
+    total = 0.0
+    for d in range(3):
+        total += lines[d, 0] * (lines[d, 0] + way * lines[d, 1])
+    return total

@@ -1,0 +1,234 @@
+"""Certified upper bounds of how a vehicle twists about its thrust, and what its rotors give then.
+
+Flight and yaw together say how the vehicle turns. With F = a + g e3, its direction b, and
+
+    w = F x j / F.F,    w' = F x (s - 2 (F.j / F.F) j) / F.F,    b' = w x b,
+
+the body, tilted to b by the shortest way after a turn by the yaw psi, has about its own z axis
+
+    omega_z = psi' - w_3 / (1 + b_3),
+    alpha_z = psi'' - w'_3 / (1 + b_3) + w_3 b'_3 / (1 + b_3)^2,
+
+and across it the torque I w' + I_z omega_z b', where I is its inertia across z and I_z that about
+it. Whatever the direction of the nose, four rotors in a square of lever l whose torque is kappa
+times their thrust then give, times four and over the mass m, at most
+
+    |F| + c |w' + r omega_z b'| + k |alpha_z|,    c = sqrt(2) I / (l m), r = I_z / I,
+                                                  k = I_z / (kappa m)
+
+and at least the same with the other signs. On intervals all of it lies within radii of lines
+(`kernels.lines`); bounds and subdivision are as in `kernels.rotors`.
+"""
+
+import numpy as np
+
+from peakflight.kernels.bernstein import EPSILON, control_points
+from peakflight.kernels.jit import inner, kernel
+from peakflight.kernels.lines import (
+    ROUNDED,
+    cross,
+    dot,
+    drawn,
+    end_norm,
+    inverse,
+    inverse_root,
+    keep,
+    line,
+    negative,
+    plus,
+    thickness,
+    times,
+)
+from peakflight.kernels.rotors import SMALLEST, along, draw
+from peakflight.kernels.turning import DEPTH, NESTING, split
+
+COUNT = 4
+"""What is bounded: |omega_z|, |alpha_z|, and what the most and the least of a rotor's thrusts ask,
+in the form of `kernels.rotors`."""
+SPLITS = 2000
+"""Subdivisions of one part of a piece; beyond, the bound of an interval is taken as it is."""
+F, JERK, TURN, RATE, AXIS, SWING, TORQUE, TWIST, ROWS = 0, 3, 9, 12, 15, 18, 21, 24, 26
+"""Rows of lines: F and j, w', w, b, b', w' + r omega_z b', then omega_z and alpha_z."""
+
+
+@kernel
+def largest(
+    coefficients, durations, yaw, parts, lost, firsts, figures, limits, gravity, tables, tolerance,
+    upper,
+):  # fmt: skip
+    """Upper bounds of what is limited over every piece of a flight, over the limits.
+
+    Parameters
+    ----------
+    coefficients, durations
+        (K, N+1, 3) and (K,) s of the flight.
+    yaw, parts, lost, firsts
+        (M, n+1, 3) with the yaw in the first axis, (M,) s, (M, 2) what its rate and acceleration
+        are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
+        (K+1,) `firsts` on.
+    figures
+        (3,) c, r and k above.
+    limits
+        (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
+        least thrust may fall, as in `Limits.as_array`.
+    tables
+        Of `bernstein_tables` and `falling_factorials` of the larger degree of both.
+    tolerance
+        To which bounds are closed, relative to the limit or the value, if that is larger.
+    upper
+        (K, COUNT) gets the bounds; NaN where nothing is limited.
+    """
+    degree = max(coefficients.shape[1] - 3, yaw.shape[1] - 2, 0)
+    whole = np.empty((2, degree + 1, 9))
+    stack = np.empty((DEPTH + 3, degree + 1, 11))
+    points = np.empty((degree + 1, 3))
+    lines = np.empty((ROWS, 3))
+    state = np.empty((DEPTH + 3, 2))
+    turned = np.empty((2, 2))
+    bounds = np.empty((3, COUNT))
+    errors = np.zeros(3)
+    sizes = np.zeros(3)
+    for k in range(durations.size):
+        for vector in range(3):
+            errors[vector], sizes[vector] = control_points(
+                coefficients, k, durations[k], vector + 2, degree,
+                gravity if vector == 0 else 0.0, tables[0], tables[1], points,
+            )  # fmt: skip
+            for i in range(degree + 1):
+                for d in range(3):
+                    whole[0, i, 3 * vector + d] = points[i, d]
+        bounds[:] = 0.0
+        rest = durations[k]
+        for part in range(firsts[k], firsts[k + 1]):
+            row = 0
+            if part + 1 < firsts[k + 1]:
+                split(whole, 0, degree, parts[part] / rest)
+                rest -= parts[part]
+                row = 1
+            for i in range(degree + 1):
+                for c in range(9):
+                    stack[0, i, c] = whole[row, i, c]
+            state[0, 0] = float(part - firsts[k] + 1)
+            state[0, 1] = 0.0
+            for order in range(2):
+                turned[order] = control_points(
+                    yaw, part, parts[part], order + 1, degree, 0.0, tables[0], tables[1], points
+                )
+                turned[order, 0] += lost[part, order]
+                for i in range(degree + 1):
+                    stack[0, i, 9 + order] = points[i, 0]
+            _close(
+                stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance,
+                lines, bounds,
+            )  # fmt: skip
+        for q in range(COUNT):
+            upper[k, q] = np.nan
+            if limits[q] > 0.0:
+                upper[k, q] = max(bounds[0, q], bounds[1, q]) / limits[q] * (1.0 + 4.0 * EPSILON)
+
+
+@inner
+def _close(
+    stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance, lines, bounds
+):
+    """Raise bounds (3, COUNT), from below, from above and of an interval, by a part of a piece.
+
+    In row 0 of the stack are its control points; state: how often each interval was subdivided, in
+    all and within the part; turned (2, 2): error and size of the yaw's rate and acceleration.
+    """
+    waiting = 1
+    splits = 0
+    while waiting > 0:
+        waiting -= 1
+        nesting = state[waiting, 0]
+        depth = state[waiting, 1]
+        bounds[2] = np.inf
+        if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures[1], lines):
+            _measure(lines, figures[0], figures[2], gravity, bounds)
+        is_closed = True
+        for q in range(COUNT):
+            if limits[q] > 0.0:
+                low = bounds[0, q]
+                if not bounds[2, q] <= low + tolerance * max(low, limits[q]):
+                    is_closed = False
+        if is_closed or waiting >= DEPTH or splits >= SPLITS or depth >= NESTING:
+            for q in range(COUNT):
+                bounds[1, q] = max(bounds[1, q], bounds[2, q])
+            continue
+        split(stack, waiting, degree, 0.5)
+        for side in range(2):
+            state[waiting + side, 0] = nesting + 1.0
+            state[waiting + side, 1] = depth + 1.0
+        splits += 1
+        waiting += 2
+
+
+@inner
+def _draw(stack, row, degree, errors, sizes, nesting, turned, ratio, lines):
+    """Lines <- all of the quantities at the top on an interval; ratio: r there.
+
+    Returns whether they are defined: there is thrust all along, and it does not point straight
+    down.
+    """
+    if not draw(stack, row, degree, errors, sizes, nesting, lines):
+        return False
+    share = inverse_root(dot(lines, F, F))
+    if not share[2] < np.inf:
+        return False
+    square = times(share, share)
+    cross(lines, F, JERK, RATE)
+    for d in range(3):
+        keep(lines, RATE + d, times(line(lines, RATE + d), square))
+        keep(lines, AXIS + d, times(line(lines, F + d), share))
+    cross(lines, RATE, AXIS, SWING)
+    height = line(lines, AXIS + 2)
+    rise = inverse((1.0 + height[0], height[1], height[2] + ROUNDED))
+    if not rise[2] < np.inf:
+        return False
+    for order in range(2):
+        lost = turned[order, 0] + (degree * nesting + 16.0) * EPSILON * turned[order, 1]
+        keep(lines, TWIST + order, drawn(stack, row, 9 + order, degree, lost))
+    tilting = times(line(lines, RATE + 2), rise)
+    twist = plus(line(lines, TWIST), negative(tilting))
+    change = plus(line(lines, TWIST + 1), negative(times(line(lines, TURN + 2), rise)))
+    change = plus(change, times(times(tilting, rise), line(lines, SWING + 2)))
+    keep(lines, TWIST, twist)
+    keep(lines, TWIST + 1, change)
+    pull = (ratio * twist[0], ratio * twist[1], ratio * twist[2])
+    for d in range(3):
+        swung = times(pull, line(lines, SWING + d))
+        keep(lines, TORQUE + d, plus(line(lines, TURN + d), swung))
+    return True
+
+
+@inner
+def _measure(lines, reach, spin, gravity, bounds):
+    """Bounds of what is limited on an interval: above, and below its maximum; reach, spin: c, k.
+
+    At an end of the interval it is within the radii of what it is at the ends of the lines.
+    """
+    bounds[2] = 0.0
+    centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
+    wide = thickness(lines, F) + reach * thickness(lines, TORQUE) + spin * lines[TWIST + 1, 2]
+    size = gravity
+    for side in range(2):
+        way = 2.0 * side - 1.0
+        for order in range(2):
+            end = abs(lines[TWIST + order, 0] + way * lines[TWIST + order, 1])
+            radius = lines[TWIST + order, 2] + ROUNDED * end
+            bounds[0, order] = max(bounds[0, order], end - radius)
+            bounds[2, order] = max(bounds[2, order], (end + radius) * (1.0 + ROUNDED))
+            change = end
+        thrust = end_norm(lines, F, way)
+        turning = reach * end_norm(lines, TORQUE, way) + spin * change
+        size = max(size, gravity + thrust + turning)
+        least = gravity - along(lines, way) / (centre * (1.0 + ROUNDED)) + turning
+        bounds[0, 2] = max(bounds[0, 2], thrust + turning - wide)
+        bounds[0, 3] = max(bounds[0, 3], gravity - thrust + turning - wide)
+        bounds[2, 2] = max(bounds[2, 2], thrust + turning + wide)
+        bounds[2, 3] = max(bounds[2, 3], least + wide)
+    for q in range(2, COUNT):
+        bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
+    for q in range(COUNT):
+        if np.isnan(bounds[2, q]):
+            bounds[2, q] = np.inf
