@@ -138,7 +138,7 @@ def certify_answer(
     passed = trajectory.breakpoints[np.concatenate(([0], np.cumsum(counts)))]
     peaks, problems = certify_yaw(problem.heading, yaw, trajectory, passed)
     if problem.heading.is_about_body or problem.limits.on_rotors:
-        twisted, exceeding = certify_twist(problem.heading, problem.limits, yaw, trajectory)
+        twisted, exceeding = certify_twist(problem, problem.heading, yaw, trajectory)
         twisted = {  # of limits on rotors, what holds without twisting is proven as well
             name: np.maximum(kappa, report.peaks.get(name, kappa))
             for name, kappa in twisted.items()
@@ -176,7 +176,7 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
     The certified trajectory and alpha, or None if no alpha keeps the limits.
     """
     _check_axes(trajectory)
-    eased = 1.0 if limits.reach is None else _ease(trajectory, limits)
+    eased = 1.0 if limits.figures is None else _ease(trajectory, limits)
     start = trajectory if eased == 1.0 else trajectory.stretch(eased)
     coefficients, times = fresh(start.coefficients), fresh(start.segment_times)
     upper = np.empty((len(times), len(KINDS)))
@@ -240,7 +240,7 @@ def _arguments(
         np.empty_like(upper),
         bounds.quotients_workspace(degree) if limits.on_leaning else None,
         turning.workspace(degree) if limits.on_turning else None,
-        None if limits.reach is None else rotors.workspace(degree, limits.reach),
+        None if limits.figures is None else rotors.workspace(degree, limits.figures),
     )
 
 

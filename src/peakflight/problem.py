@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from peakflight.airframe import Airframe
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, LimitKind, Limits
 from peakflight.vehicle import Vehicle
@@ -240,6 +241,13 @@ class Problem:
         """Every kind that is limited, of the flight and of its yaw, with the limit in its unit."""
         flight = {kind: getattr(self.limits, kind.name) for kind in self.limits.active}
         return flight if self.heading is None else flight | self.heading.limits
+
+    @cached_property
+    def airframe(self) -> Airframe | None:
+        """What is known of what flies: of the limits on rotors, or else of the vehicle."""
+        if self.limits.airframe is not None or self.vehicle is None:
+            return self.limits.airframe
+        return self.vehicle.airframe  # type: ignore[union-attr]
 
     @property
     def leg_lengths(self) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 The attitude tilts by the shortest way from upright to the thrust direction b, after a turn by the
 yaw (`kernels.flatness`). While b goes around, that tilt alone turns the vehicle about its own z
-axis, by omega = -w_3 / (1 + b_3) where w = F x j / F.F is how b turns. A yaw with psi' = -omega
-undoes it.
+axis, by omega = -w_3 / (1 + b_3) where w = F x j / F.F is how b turns, and F is the thrust with
+drag, j its derivative (`kernels.rotors`). A yaw with psi' = -omega undoes it.
 """
 
 import numpy as np
 
+from peakflight.airframe import Airframe
 from peakflight.limits import GRAVITY
 from peakflight.trajectory import Trajectory
 
@@ -29,7 +30,7 @@ _HERMITE = np.linalg.inv(
 """Coefficients of degree 5 from value, slope and curvature at 0 and at 1."""
 
 
-def untwisted(flight: Trajectory, counts: np.ndarray) -> Trajectory:
+def untwisted(flight: Trajectory, counts: np.ndarray, airframe: Airframe | None) -> Trajectory:
     """The yaw from 0 at which a vehicle that flies does not turn about its thrust.
 
     Parameters
@@ -39,6 +40,8 @@ def untwisted(flight: Trajectory, counts: np.ndarray) -> Trajectory:
     counts
         (K,) even parts of each piece: the yaw is of degree 5 on each, right at their ends in rate
         and acceleration.
+    airframe
+        What flies, for its drag; None if not known.
 
     Returns
     -------
@@ -48,12 +51,12 @@ def untwisted(flight: Trajectory, counts: np.ndarray) -> Trajectory:
     piece = np.repeat(np.arange(len(flight)), counts)
     begins = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece]) * parts
     nodes = begins[:, None] + parts[:, None] * (0.5 + 0.5 * _GAUSS)
-    rates, _ = _tilting(flight, np.repeat(piece, len(_GAUSS)), nodes.ravel())
+    rates, _ = _tilting(flight, np.repeat(piece, len(_GAUSS)), nodes.ravel(), airframe)
     turns = -0.5 * parts * (rates.reshape(nodes.shape) * _WEIGHTS).sum(axis=1)
     values = np.concatenate(([0.0], np.cumsum(turns)))
     ends = np.empty((len(piece), 6))
     for side in range(2):
-        rate, acceleration = _tilting(flight, piece, begins + side * parts)
+        rate, acceleration = _tilting(flight, piece, begins + side * parts, airframe)
         ends[:, 3 * side] = values[side : len(values) - 1 + side]
         ends[:, 3 * side + 1] = -rate * parts
         ends[:, 3 * side + 2] = -acceleration * parts**2
@@ -62,19 +65,23 @@ def untwisted(flight: Trajectory, counts: np.ndarray) -> Trajectory:
 
 
 def turning_about_z(
-    flight: Trajectory, yaw: Trajectory, times: np.ndarray
+    flight: Trajectory, yaw: Trajectory, times: np.ndarray, airframe: Airframe | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) rad/s and rad/s^2 of a vehicle about its own z axis, at (n,) s of a flight and a yaw."""
     piece = np.searchsorted(flight.breakpoints[1:-1], times, side="right")
-    rate, acceleration = _tilting(flight, piece, times - flight.breakpoints[piece])
+    rate, acceleration = _tilting(flight, piece, times - flight.breakpoints[piece], airframe)
     return yaw(times, 1)[:, 0] + rate, yaw(times, 2)[:, 0] + acceleration
 
 
 def _tilting(
-    flight: Trajectory, piece: np.ndarray, local: np.ndarray
+    flight: Trajectory, piece: np.ndarray, local: np.ndarray, airframe: Airframe | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) rad/s and rad/s^2 by which tilting the shortest way turns about z, at local times."""
-    acceleration, jerk, snap = (flight.at(piece, local, order) for order in (2, 3, 4))
+    velocity, acceleration, jerk, snap = (flight.at(piece, local, order) for order in range(1, 5))
+    if airframe is not None and any(airframe.drag):
+        drag = airframe.figures[1]
+        snap, jerk = snap + drag * jerk, jerk + drag * acceleration
+        acceleration = acceleration + drag * velocity
     force = acceleration + np.array([0.0, 0.0, GRAVITY])
     square = (force * force).sum(axis=1, keepdims=True)
     square[square == 0.0] = np.inf

@@ -9,7 +9,8 @@ import numpy as np
 from peakflight.kernels import twisting
 from peakflight.kernels.bernstein import bernstein_tables, falling_factorials
 from peakflight.kernels.jit import fresh
-from peakflight.limits import GRAVITY, KINDS, ROTORS, Limits
+from peakflight.limits import GRAVITY, KINDS, ROTORS
+from peakflight.problem import Problem
 from peakflight.trajectory import Trajectory
 from peakflight.yaw import BODY_KINDS, Heading
 from peakflight.yaw_certificate import UNBOUNDED, exceeded, unfit
@@ -24,14 +25,14 @@ its terms' sizes."""
 
 
 def certify_twist(
-    heading: Heading, limits: Limits, yaw: Trajectory | None, flight: Trajectory
+    problem: Problem, heading: Heading, yaw: Trajectory | None, flight: Trajectory
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Prove the limits of a heading that are about the body, and those on rotors with the yaw.
 
     Parameters
     ----------
-    limits
-        Of the flight; those on rotors count.
+    problem, heading
+        Of its limits those on rotors count, and its airframe; and what is asked of the nose.
     yaw
         One axis, rad, during the flight; nothing is proven without one that fits.
 
@@ -44,11 +45,12 @@ def certify_twist(
     kinds = {kind.name: kind for kind in (*BODY_KINDS, *KINDS)}
     names = [kind.name for kind in BODY_KINDS] + list(ROTORS)
     allowed = np.array([held.get(name, np.nan) for name in names])
+    limits = problem.limits
     allowed[2:] = limits.as_array()[[KINDS.index(kinds[name]) for name in ROTORS]]
     is_fit = yaw is not None and not unfit(heading, yaw, flight)
     upper = np.full((len(flight), twisting.COUNT), np.inf)
     if yaw is not None and is_fit:
-        upper = _bounds(allowed, limits, yaw, flight)
+        upper = _bounds(allowed, _figures(problem), yaw, flight)
     peaks, problems = {}, []
     for name, kappa in zip(names, upper.T, strict=True):
         limit = held.get(name, getattr(limits, name, None))
@@ -58,7 +60,18 @@ def certify_twist(
     return peaks, problems
 
 
-def _bounds(allowed: np.ndarray, limits: Limits, yaw: Trajectory, flight: Trajectory) -> np.ndarray:
+def _figures(problem: Problem) -> np.ndarray:
+    """(5,) what kernels take of the airframe."""
+    if problem.airframe is None:
+        return np.zeros(5)
+    if problem.airframe.can_steer:
+        return problem.airframe.steering
+    return np.concatenate((problem.airframe.figures, np.zeros(2)))
+
+
+def _bounds(
+    allowed: np.ndarray, figures: np.ndarray, yaw: Trajectory, flight: Trajectory
+) -> np.ndarray:
     """(K, twisting.COUNT) certified kappa."""
     slack = SAME_TIME * flight.duration
     borders = flight.breakpoints[1:-1]
@@ -71,7 +84,6 @@ def _bounds(allowed: np.ndarray, limits: Limits, yaw: Trajectory, flight: Trajec
     coefficients[:, :, 0] = parts.coefficients[:, :, 0]
     degree = max(flight.degree, parts.degree)
     factorials = falling_factorials(degree)
-    airframe = limits.airframe
     upper = np.empty((len(flight), twisting.COUNT))
     twisting.largest(
         fresh(flight.coefficients),
@@ -80,7 +92,7 @@ def _bounds(allowed: np.ndarray, limits: Limits, yaw: Trajectory, flight: Trajec
         fresh(parts.segment_times),
         _lost(parts, is_shifted=bool(is_new.any()), factorials=factorials),
         firsts.astype(np.int64),
-        airframe.steering if airframe is not None and limits.on_rotors else np.zeros(3),
+        figures,
         allowed,
         GRAVITY,
         (bernstein_tables(degree)[0], factorials),

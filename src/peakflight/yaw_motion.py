@@ -89,7 +89,7 @@ def turning(
     heading = heading.within(share)
     free = None
     if heading.is_about_body:
-        free = untwisted(trajectory, FINER * np.diff(spline.firsts))
+        free = untwisted(trajectory, FINER * np.diff(spline.firsts), problem.airframe)
         if heading.policy == "free":
             return Turning(free, 1.0, 0.0)
     if heading.angles is not None:

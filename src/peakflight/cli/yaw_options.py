@@ -81,7 +81,7 @@ def heading_of(
             option = "--yaw-limits limits" if yaw is None else "--yaw waypoints asks for"
             raise InvalidProblem(f"{option} the yaw of the course, which has none; give a --yaw")
         fields["angles"] = course.tolist()
-    return Heading(**fields, **(limits or {}))  # type: ignore[arg-type]
+    return Heading(**fields, **(limits or {}))
 
 
 def parse_yaw(text: str) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def yaw_figure(plan: Plan) -> Figure:
     number_legs(panels[0], plan.waypoint_times)
     _draw_yaw(panels[0], plan, times)
     if heading.is_about_body:
-        curves = turning_about_z(plan.trajectory, plan.yaw_motion, times)
+        curves = turning_about_z(plan.trajectory, plan.yaw_motion, times, plan.problem.airframe)
     else:
         curves = plan.yaw(times, derivative=1), plan.yaw(times, derivative=2)
     for kind, axes, values in zip(heading.kinds, panels[1:], curves, strict=True):

@@ -1,6 +1,7 @@
 """Certified upper bounds of how a vehicle twists about its thrust, and what its rotors give then.
 
-Flight and yaw together say how the vehicle turns. With F = a + g e3, its direction b, and
+Flight and yaw together say how the vehicle turns. With F, its derivatives j and s, its direction b
+and epsilon as in `kernels.rotors`, and
 
     w = F x j / F.F,    w' = F x (s - 2 (F.j / F.F) j) / F.F,    b' = w x b,
 
@@ -13,11 +14,11 @@ and across it the torque I w' + I_z omega_z b', where I is its inertia across z 
 it. Whatever the direction of the nose, four rotors in a square of lever l whose torque is kappa
 times their thrust then give, times four and over the mass m, at most
 
-    |F| + c |w' + r omega_z b'| + k |alpha_z|,    c = sqrt(2) I / (l m), r = I_z / I,
-                                                  k = I_z / (kappa m)
+    |F| + epsilon b.v + c |w' + r omega_z b'| + k |alpha_z|,
 
-and at least the same with the other signs. On intervals all of it lies within radii of lines
-(`kernels.lines`); bounds and subdivision are as in `kernels.rotors`.
+with c = sqrt(2) I / (l m), r = I_z / I and k = I_z / (kappa m), and at least the same with the
+other signs of what turns it. On intervals all of it lies within radii of lines (`kernels.lines`);
+bounds and subdivision are as in `kernels.rotors`.
 """
 
 import numpy as np
@@ -31,7 +32,6 @@ from peakflight.kernels.lines import (
     drawn,
     end_norm,
     inverse,
-    inverse_root,
     keep,
     line,
     negative,
@@ -39,7 +39,18 @@ from peakflight.kernels.lines import (
     thickness,
     times,
 )
-from peakflight.kernels.rotors import SMALLEST, along, draw
+from peakflight.kernels.rotors import (
+    AXIS,
+    JERK,
+    LINES,
+    PULL,
+    SMALLEST,
+    TURN,
+    F,
+    along,
+    control_columns,
+    draw,
+)
 from peakflight.kernels.turning import DEPTH, NESTING, split
 
 COUNT = 4
@@ -47,8 +58,9 @@ COUNT = 4
 in the form of `kernels.rotors`."""
 SPLITS = 2000
 """Subdivisions of one part of a piece; beyond, the bound of an interval is taken as it is."""
-F, JERK, TURN, RATE, AXIS, SWING, TORQUE, TWIST, ROWS = 0, 3, 9, 12, 15, 18, 21, 24, 26
-"""Rows of lines: F and j, w', w, b, b', w' + r omega_z b', then omega_z and alpha_z."""
+RATE, SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 9, LINES + 11
+"""Rows of lines after those of `rotors`, of which TURN is w': w, b', w' + r omega_z b', then
+omega_z and alpha_z."""
 
 
 @kernel
@@ -67,7 +79,7 @@ def largest(
         are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
         (K+1,) `firsts` on.
     figures
-        (3,) c, r and k above.
+        (5,) c, delta, epsilon, r and k.
     limits
         (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
         least thrust may fall, as in `Limits.as_array`.
@@ -78,26 +90,23 @@ def largest(
     upper
         (K, COUNT) gets the bounds; NaN where nothing is limited.
     """
-    degree = max(coefficients.shape[1] - 3, yaw.shape[1] - 2, 0)
-    whole = np.empty((2, degree + 1, 9))
-    stack = np.empty((DEPTH + 3, degree + 1, 11))
+    degree = max(coefficients.shape[1] - 2, yaw.shape[1] - 2, 0)
+    whole = np.empty((2, degree + 1, 12))
+    stack = np.empty((DEPTH + 3, degree + 1, 14))
     points = np.empty((degree + 1, 3))
     lines = np.empty((ROWS, 3))
     state = np.empty((DEPTH + 3, 2))
     turned = np.empty((2, 2))
     bounds = np.empty((3, COUNT))
-    errors = np.zeros(3)
-    sizes = np.zeros(3)
+    errors = np.zeros(4)
+    sizes = np.zeros(4)
     for k in range(durations.size):
-        for vector in range(3):
-            errors[vector], sizes[vector] = control_points(
-                coefficients, k, durations[k], vector + 2, degree,
-                gravity if vector == 0 else 0.0, tables[0], tables[1], points,
-            )  # fmt: skip
-            for i in range(degree + 1):
-                for d in range(3):
-                    whole[0, i, 3 * vector + d] = points[i, d]
         bounds[:] = 0.0
+        if not control_columns(
+            coefficients, k, durations[k], figures[1], gravity, tables[0], tables[1], points, whole,
+            errors, sizes,
+        ):  # fmt: skip
+            errors[:] = np.inf
         rest = durations[k]
         for part in range(firsts[k], firsts[k + 1]):
             row = 0
@@ -106,7 +115,7 @@ def largest(
                 rest -= parts[part]
                 row = 1
             for i in range(degree + 1):
-                for c in range(9):
+                for c in range(12):
                     stack[0, i, c] = whole[row, i, c]
             state[0, 0] = float(part - firsts[k] + 1)
             state[0, 1] = 0.0
@@ -116,7 +125,7 @@ def largest(
                 )
                 turned[order, 0] += lost[part, order]
                 for i in range(degree + 1):
-                    stack[0, i, 9 + order] = points[i, 0]
+                    stack[0, i, 12 + order] = points[i, 0]
             _close(
                 stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance,
                 lines, bounds,
@@ -143,8 +152,8 @@ def _close(
         nesting = state[waiting, 0]
         depth = state[waiting, 1]
         bounds[2] = np.inf
-        if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures[1], lines):
-            _measure(lines, figures[0], figures[2], gravity, bounds)
+        if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures, lines):
+            _measure(lines, figures[0], figures[4], gravity, bounds)
         is_closed = True
         for q in range(COUNT):
             if limits[q] > 0.0:
@@ -164,22 +173,18 @@ def _close(
 
 
 @inner
-def _draw(stack, row, degree, errors, sizes, nesting, turned, ratio, lines):
-    """Lines <- all of the quantities at the top on an interval; ratio: r there.
+def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
+    """Lines <- all of the quantities at the top on an interval.
 
     Returns whether they are defined: there is thrust all along, and it does not point straight
     down.
     """
-    if not draw(stack, row, degree, errors, sizes, nesting, lines):
+    if not draw(stack, row, degree, errors, sizes, nesting, figures[2], lines):
         return False
-    share = inverse_root(dot(lines, F, F))
-    if not share[2] < np.inf:
-        return False
-    square = times(share, share)
+    square = inverse(dot(lines, F, F))
     cross(lines, F, JERK, RATE)
     for d in range(3):
         keep(lines, RATE + d, times(line(lines, RATE + d), square))
-        keep(lines, AXIS + d, times(line(lines, F + d), share))
     cross(lines, RATE, AXIS, SWING)
     height = line(lines, AXIS + 2)
     rise = inverse((1.0 + height[0], height[1], height[2] + ROUNDED))
@@ -187,13 +192,14 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, ratio, lines):
         return False
     for order in range(2):
         lost = turned[order, 0] + (degree * nesting + 16.0) * EPSILON * turned[order, 1]
-        keep(lines, TWIST + order, drawn(stack, row, 9 + order, degree, lost))
+        keep(lines, TWIST + order, drawn(stack, row, 12 + order, degree, lost))
     tilting = times(line(lines, RATE + 2), rise)
     twist = plus(line(lines, TWIST), negative(tilting))
     change = plus(line(lines, TWIST + 1), negative(times(line(lines, TURN + 2), rise)))
     change = plus(change, times(times(tilting, rise), line(lines, SWING + 2)))
     keep(lines, TWIST, twist)
     keep(lines, TWIST + 1, change)
+    ratio = figures[3]
     pull = (ratio * twist[0], ratio * twist[1], ratio * twist[2])
     for d in range(3):
         swung = times(pull, line(lines, SWING + d))
@@ -209,7 +215,8 @@ def _measure(lines, reach, spin, gravity, bounds):
     """
     bounds[2] = 0.0
     centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
-    wide = thickness(lines, F) + reach * thickness(lines, TORQUE) + spin * lines[TWIST + 1, 2]
+    wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
+    wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
     size = gravity
     for side in range(2):
         way = 2.0 * side - 1.0
@@ -221,12 +228,13 @@ def _measure(lines, reach, spin, gravity, bounds):
             change = end
         thrust = end_norm(lines, F, way)
         turning = reach * end_norm(lines, TORQUE, way) + spin * change
-        size = max(size, gravity + thrust + turning)
-        least = gravity - along(lines, way) / (centre * (1.0 + ROUNDED)) + turning
-        bounds[0, 2] = max(bounds[0, 2], thrust + turning - wide)
-        bounds[0, 3] = max(bounds[0, 3], gravity - thrust + turning - wide)
-        bounds[2, 2] = max(bounds[2, 2], thrust + turning + wide)
-        bounds[2, 3] = max(bounds[2, 3], least + wide)
+        pull = lines[PULL, 0] + way * lines[PULL, 1]
+        size = max(size, gravity + thrust + abs(pull) + turning)
+        rest = gravity - pull + turning
+        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning - wide)
+        bounds[0, 3] = max(bounds[0, 3], rest - thrust - wide)
+        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + wide)
+        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + wide)
     for q in range(2, COUNT):
         bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
     for q in range(COUNT):
