@@ -14,6 +14,9 @@ SMALLEST, LARGEST = 1e-9, 1e9
 NUMBERS = ("mass", "inertia", "lever", "yaw_inertia", "torque_per_thrust")
 """The fields that are a positive number each; the last two may be unknown."""
 
+SPIN = 4
+"""Which of `Airframe.steering` an acceleration about z multiplies."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Airframe:
@@ -29,6 +32,8 @@ class Airframe:
     """Moment of inertia about the yaw axis, kg m^2; with the next for a nose that is steered."""
     torque_per_thrust: float | None = None
     """Torque of a rotor about its axis over its thrust, m."""
+    inertia_difference: float = 0.0
+    """By how much inertia is less about the other one of the roll and pitch axes, kg m^2."""
     drag: tuple[float, float] = (0.0, 0.0)
     """Force against the velocity, over it, across and along the thrust, kg/s."""
 
@@ -50,11 +55,19 @@ class Airframe:
                 )
 
         object.__setattr__(self, "drag", _drag(self.drag))
+        if not 0.0 <= self.inertia_difference < self.inertia:
+            raise InvalidProblem(
+                f"airframe inertia_difference is {self.inertia_difference!r}; it must be from 0 to "
+                f"below the inertia, {self.inertia:g}"
+            )
 
     def is_near(self, other: "Airframe") -> bool:
         """Whether two airframes are the same but for rounding."""
         pairs = [(getattr(self, name), getattr(other, name)) for name in NUMBERS]
         pairs += zip(self.drag, other.drag, strict=True)
+        uneven = abs(self.inertia_difference - other.inertia_difference)
+        if not uneven <= 1e-9 * self.inertia:
+            return False
         return all(
             one is two or (None not in (one, two) and math.isclose(one, two, rel_tol=1e-9))
             for one, two in pairs
@@ -81,31 +94,37 @@ class Airframe:
 
     @property
     def steering(self) -> np.ndarray:
-        """(5,) c, delta, epsilon, r and k of `kernels.twisting`, where turning about z counts.
+        """(7,) what `kernels.twisting` takes, where turning about z counts.
 
-        After the `figures`, the ratio of the moments of inertia, and the collective acceleration
-        that an angular acceleration of 1 rad/s^2 about z takes from a rotor, m.
+        After the `figures`, the ratio of the moments of inertia; the collective acceleration that
+        an angular acceleration of 1 rad/s^2 about z takes from a rotor, m; and what unequal inertia
+        across z takes: of a product with the rate about z, m, and of a squared rate across it, m.
         """
         if self.yaw_inertia is None or self.torque_per_thrust is None:
             raise InvalidProblem("airframe has no yaw_inertia and torque_per_thrust")
         spin = self.yaw_inertia / (self.torque_per_thrust * self.mass)
-        return np.array([*self.figures, self.yaw_inertia / self.inertia, spin])
+        ratio, uneven = self.yaw_inertia / self.inertia, self.inertia_difference
+        twisting = (1.0 + ratio) * uneven / self.inertia * self.reach
+        crossed = 0.5 * uneven / (self.torque_per_thrust * self.mass)
+        return np.array([*self.figures, ratio, spin, twisting, crossed])
 
     def to_dict(self) -> dict[str, Any]:
         """What is known, by name, from which `from_dict` makes the same."""
         values = {name: getattr(self, name) for name in NUMBERS}
         known: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
+        if self.inertia_difference:
+            known["inertia_difference"] = self.inertia_difference
         return {**known, "drag": list(self.drag)} if any(self.drag) else known
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """Airframe by the names of its fields; those that have a default may be left out."""
         if not isinstance(values, Mapping) or not set(NUMBERS[:3]) <= set(values) <= {
-            *NUMBERS, "drag",
+            *NUMBERS, "inertia_difference", "drag",
         }:  # fmt: skip
             raise InvalidProblem(
                 f"airframe is {values!r}; it must have {', '.join(NUMBERS[:3])}, and may have "
-                f"{', '.join(NUMBERS[3:])} and drag"
+                f"{', '.join(NUMBERS[3:])}, inertia_difference and drag"
             )
         return cls(**values)
 

@@ -14,7 +14,7 @@ twists the vehicle, which takes more: `twist_certificate` proves that.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -197,6 +197,30 @@ class Limits:
             values[[most, least]] *= 4.0 / self.airframe.mass
             values[least] = GRAVITY - values[least]
         return values
+
+    def sparing(self, demands: Mapping[str, float]) -> Self:
+        """The same, with a part of the rotors' range kept free at either end, for a yaw to take.
+
+        demands: name of a limit on rotors to N; at most half of what hovering leaves is kept free.
+        """
+        if self.airframe is None:
+            return self
+        hover = self.airframe.mass * GRAVITY / 4.0
+        changed = {}
+        for name, demand in demands.items():
+            limit = getattr(self, name)
+            towards = hover - limit
+            changed[name] = limit + math.copysign(min(demand, 0.5 * abs(towards)), towards)
+        return replace(self, **changed)
+
+    @property
+    def rotor_rooms(self) -> dict[str, float]:
+        """Name of each limit on rotors that is set to how far it is from hovering, N."""
+        if self.airframe is None:
+            return {}
+        hover = self.airframe.mass * GRAVITY / 4.0
+        values = {name: getattr(self, name) for name in ROTORS}
+        return {name: abs(hover - value) for name, value in values.items() if value is not None}
 
     def ratios(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Kappa of the kinds that are set, from `limited_values` of the same airframe."""

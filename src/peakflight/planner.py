@@ -15,11 +15,18 @@ from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
 from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
-from peakflight.steering import steered
+from peakflight.steering import Steered, steered
 from peakflight.version import __version__
 from peakflight.yaw import as_heading
 
 _log = logging.getLogger("peakflight")
+
+RESERVES = 3
+"""Most times that a problem is solved again with less of the rotors' range."""
+EASED = 1.1
+"""Thrust that is set aside then, over what was lacking."""
+ENOUGH = 1.003
+"""A flight that the yaw makes longer by less than this factor is not solved again."""
 
 
 def plan(
@@ -81,10 +88,9 @@ def plan(
         settings = replace(settings, **tuning)  # type: ignore[type-var]
     with jit.announced(module.kernels(problem, settings), _log):
         impossible = _contradiction(problem)
-        outcome = module.solve(problem, settings)
+        outcome, flight = _answered(module, problem, settings)
         problem = outcome.problem or problem
         pieces = outcome.pieces or (1,) * (len(problem.waypoints) - 1)
-        flight = steered(problem, outcome.trajectory, pieces)
     report = flight.report
     status = Status.INFEASIBLE if flight.too_fast else outcome.status
     if not report.feasible and status is not Status.INFEASIBLE:
@@ -145,6 +151,42 @@ def replan(
         if len(set(last.pieces)) == 1 and "max_pieces" not in options:
             options.setdefault("pieces", last.pieces[0])
     return plan(replace(last.problem, **changes), method=last.method, **options)
+
+
+def _answered(
+    module: methods.Method, problem: Problem, settings: Any
+) -> tuple[methods.Outcome, Steered]:
+    """Solve a problem and add its yaw.
+
+    What turning about z takes of the rotors, the method does not know. Where they lack it, the
+    problem is solved again within so much less of their range, and the fastest flight is taken.
+    """
+    outcome = module.solve(problem, settings)
+    answers = [_with_yaw(problem, outcome)]
+    narrow = problem
+    for _ in range(RESERVES):
+        lacking = answers[-1][1].lacking
+        length = answers[-1][1].trajectory.duration
+        if not lacking or length < ENOUGH * outcome.trajectory.duration:
+            break
+        spared = {name: EASED * demand for name, demand in lacking.items()}
+        narrow = replace(narrow, limits=narrow.limits.sparing(spared))
+        outcome = module.solve(narrow, settings)
+        answers.append(_with_yaw(problem, outcome))
+    return min(
+        answers,
+        key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
+    )
+
+
+def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outcome, Steered]:
+    """A flight with its yaw, under the limits of the problem that it answers."""
+    if outcome.problem is not None and outcome.problem.limits != problem.limits:
+        whole = replace(outcome.problem, limits=problem.limits)
+        outcome = replace(outcome, problem=whole)
+    answered = outcome.problem or problem
+    pieces = outcome.pieces or (1,) * (len(answered.waypoints) - 1)
+    return outcome, steered(answered, outcome.trajectory, pieces)
 
 
 def _fields(kind: Any) -> set[str]:

@@ -1,6 +1,8 @@
 """Add the yaw that a problem asks for to a flight, slowed down as far as the limits need it."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from peakflight.certificate import certify_answer
@@ -34,6 +36,8 @@ class Steered(NamedTuple):
     """What the yaw has cost, in words."""
     too_fast: bool = False
     """Whether it would have to be slower for the yaw, but motion is fixed at a waypoint."""
+    lacking: Mapping[str, float] = MappingProxyType({})
+    """Name of a limit on rotors to the thrust by which the yaw exceeded it at first, N."""
 
 
 def steered(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -> Steered:
@@ -97,6 +101,7 @@ def _about_body(
     stretch. The least one that does is closed in between what did and what did not.
     """
     best: Steered | None = None
+    lacking: dict[str, float] | None = None
     slow, fast = math.inf, 0.0
     stretch, share = 1.0, 1.0
     for _ in range(ROUNDS):
@@ -112,6 +117,7 @@ def _about_body(
             continue
         else:
             fast = stretch
+        lacking = _lacking(problem, report) if lacking is None else lacking
         if not problem.is_at_rest or slow <= CLOSE * max(fast, 1.0):
             break
         if best is None:
@@ -119,12 +125,23 @@ def _about_body(
         else:
             stretch = math.sqrt(max(fast, 1.0) * slow)
     if best is None:
-        return found._replace(too_fast=not problem.is_at_rest)
+        return found._replace(too_fast=not problem.is_at_rest, lacking=lacking or {})
     cost = _slower(slow) if slow > CLOSE else ""
-    return best._replace(note="; ".join(filter(None, (note, cost))))
+    return best._replace(note="; ".join(filter(None, (note, cost))), lacking=lacking or {})
 
 
-_MOST = [kind.name for kind in KINDS].index("rotor_thrust")
+def _lacking(problem: Problem, report: Report) -> dict[str, float]:
+    """By how much limits on rotors are exceeded, N."""
+    found = {}
+    for name, room in problem.limits.rotor_rooms.items():
+        excess = float(report.peaks[name].max()) - 1.0
+        if excess > 0.0:
+            found[name] = excess * (getattr(problem.limits, name) if name == MOST else room)
+    return found
+
+
+MOST = "rotor_thrust"
+_INDEX = [kind.name for kind in KINDS].index(MOST)
 
 
 class _Excess(NamedTuple):
@@ -149,8 +166,8 @@ def _excess(problem: Problem, report: Report) -> _Excess:
             of_rounding = max(of_rounding, worst)
         elif turn is not None:
             stretch = max(stretch, worst ** (1.0 / turn))
-        elif name == "rotor_thrust":  # what is beyond gravity falls with the square
-            most = limits[_MOST]
+        elif name == MOST:  # what is beyond gravity falls with the square
+            most = limits[_INDEX]
             stretch = max(stretch, math.sqrt((worst * most - GRAVITY) / (most - GRAVITY)))
         elif name == "least_rotor_thrust":
             stretch = max(stretch, math.sqrt(worst))

@@ -61,12 +61,12 @@ def certify_twist(
 
 
 def _figures(problem: Problem) -> np.ndarray:
-    """(5,) what kernels take of the airframe."""
+    """(7,) what kernels take of the airframe."""
     if problem.airframe is None:
-        return np.zeros(5)
+        return np.zeros(7)
     if problem.airframe.can_steer:
         return problem.airframe.steering
-    return np.concatenate((problem.airframe.figures, np.zeros(2)))
+    return np.concatenate((problem.airframe.figures, np.zeros(4)))
 
 
 def _bounds(

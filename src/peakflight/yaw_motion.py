@@ -9,12 +9,14 @@ Where limits are about the body, that spline is what is added to the yaw at whic
 not turn about its thrust (`peakflight.twist`): its rate and acceleration are those of the body.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from peakflight.airframe import SPIN
 from peakflight.banded_program import Bounds, least_scale, least_squares
 from peakflight.problem import Problem
 from peakflight.trajectory import Trajectory
@@ -40,6 +42,9 @@ BRISK = 0.1
 """Part of the largest horizontal speed, or distance, at which a sample has half its weight."""
 CAUTION = 1e-4
 """How much further than needed a flight is slowed down, relative: it leaves room to be smooth."""
+SPARED = 0.05
+"""Part of what hovering leaves of a rotor's range, at the nearer end, that turning about z to
+follow a direction may take: the nose rather lags than slows the flight down."""
 SAFETY = 1e-7
 """Part of a limit that is left to rounding; the certificate knows nothing of it."""
 ROUNDS = 30
@@ -86,7 +91,7 @@ def turning(
         yaw = Trajectory(constant, [trajectory.duration], trajectory.start_time)  # type: ignore[arg-type]
         return Turning(yaw, 1.0, 0.0)
     spline = _Spline.of(trajectory.segment_times)
-    heading = heading.within(share)
+    heading = _sparing(problem, heading).within(share)
     free = None
     if heading.is_about_body:
         free = untwisted(trajectory, FINER * np.diff(spline.firsts), problem.airframe)
@@ -107,6 +112,17 @@ def turning(
     added = found.yaw.subdivide(FINER).elevate(free.degree).coefficients
     whole = Trajectory(free.coefficients + added, free.segment_times, free.start_time)
     return found._replace(yaw=whole)
+
+
+def _sparing(problem: Problem, heading: Heading) -> Heading:
+    """A heading that follows, changing its rate no faster than `SPARED` of the rotors gives."""
+    rooms, airframe = problem.limits.rotor_rooms, problem.limits.airframe
+    if not (rooms and heading.follows and heading.is_about_body and airframe is not None):
+        return heading
+    spin = float(airframe.steering[SPIN])
+    most = SPARED * min(rooms.values()) * 4.0 / (airframe.mass * spin)
+    given = heading.acceleration
+    return replace(heading, acceleration=most if given is None else min(given, most))
 
 
 def _through(

@@ -108,7 +108,7 @@ def rotor_notes(problem: Problem) -> tuple[str, ...]:
     if not problem.limits.on_rotors:
         return ()
     nose = "the yaw of the plan" if problem.heading else "a heading that does not twist"
-    return (f"rotor thrusts are proven for {nose}, with drag, and equal inertias across z",)
+    return (f"rotor thrusts are proven for {nose}, with drag",)
 
 
 def ratio_cells(ratio: float) -> tuple[str, str, str]:

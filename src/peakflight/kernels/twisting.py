@@ -17,8 +17,11 @@ times their thrust then give, times four and over the mass m, at most
     |F| + epsilon b.v + c |w' + r omega_z b'| + k |alpha_z|,
 
 with c = sqrt(2) I / (l m), r = I_z / I and k = I_z / (kappa m), and at least the same with the
-other signs of what turns it. On intervals all of it lies within radii of lines (`kernels.lines`);
-bounds and subdivision are as in `kernels.rotors`.
+other signs of what turns it. If inertia differs by D between the two axes across z, and I is the
+larger, that adds at most (1 + r) D / I c |omega_z| |w| and D / (kappa m) |w|^2 / 2.
+
+On intervals all of it lies within radii of lines (`kernels.lines`); bounds and subdivision are as
+in `kernels.rotors`.
 """
 
 import numpy as np
@@ -79,7 +82,7 @@ def largest(
         are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
         (K+1,) `firsts` on.
     figures
-        (5,) c, delta, epsilon, r and k.
+        (7,) c, delta, epsilon, r, k, and the factors of |omega_z| |w| and of |w|^2.
     limits
         (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
         least thrust may fall, as in `Limits.as_array`.
@@ -153,7 +156,7 @@ def _close(
         depth = state[waiting, 1]
         bounds[2] = np.inf
         if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures, lines):
-            _measure(lines, figures[0], figures[4], gravity, bounds)
+            _measure(lines, figures, gravity, bounds)
         is_closed = True
         for q in range(COUNT):
             if limits[q] > 0.0:
@@ -208,16 +211,20 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
 
 
 @inner
-def _measure(lines, reach, spin, gravity, bounds):
-    """Bounds of what is limited on an interval: above, and below its maximum; reach, spin: c, k.
+def _measure(lines, figures, gravity, bounds):
+    """Bounds of what is limited on an interval: above, and below its maximum.
 
     At an end of the interval it is within the radii of what it is at the ends of the lines.
     """
     bounds[2] = 0.0
+    reach, spin = figures[0], figures[4]
     centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
     wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
     wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
     size = gravity
+    fastest = max(end_norm(lines, RATE, 1.0), end_norm(lines, RATE, -1.0)) + thickness(lines, RATE)
+    twist = abs(lines[TWIST, 0]) + abs(lines[TWIST, 1]) + lines[TWIST, 2]
+    uneven = (figures[5] * twist + figures[6] * fastest) * fastest * (1.0 + ROUNDED)
     for side in range(2):
         way = 2.0 * side - 1.0
         for order in range(2):
@@ -231,10 +238,13 @@ def _measure(lines, reach, spin, gravity, bounds):
         pull = lines[PULL, 0] + way * lines[PULL, 1]
         size = max(size, gravity + thrust + abs(pull) + turning)
         rest = gravity - pull + turning
-        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning - wide)
-        bounds[0, 3] = max(bounds[0, 3], rest - thrust - wide)
-        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + wide)
-        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + wide)
+        rate = max(end_norm(lines, RATE, way) - thickness(lines, RATE), 0.0)
+        spun = max(abs(lines[TWIST, 0] + way * lines[TWIST, 1]) - lines[TWIST, 2], 0.0)
+        least = (figures[5] * spun + figures[6] * rate) * rate - wide
+        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + least)
+        bounds[0, 3] = max(bounds[0, 3], rest - thrust + least)
+        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + uneven + wide)
+        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + uneven + wide)
     for q in range(2, COUNT):
         bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
     for q in range(COUNT):
