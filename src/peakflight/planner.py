@@ -166,8 +166,8 @@ def _answered(
     narrow = problem
     for _ in range(RESERVES):
         lacking = answers[-1][1].lacking
-        length = answers[-1][1].trajectory.duration
-        if not lacking or length < ENOUGH * outcome.trajectory.duration:
+        longer = answers[-1][1].trajectory.duration / outcome.trajectory.duration
+        if not lacking or (answers[-1][1].report.feasible and longer < ENOUGH):
             break
         spared = {name: EASED * demand for name, demand in lacking.items()}
         narrow = replace(narrow, limits=narrow.limits.sparing(spared))

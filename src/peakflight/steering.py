@@ -112,7 +112,7 @@ def _about_body(
         excess = _excess(problem, report)
         if report.feasible:
             best, slow = found, stretch
-        elif excess.of_rounding > 1.0 and share > 0.5:
+        elif turned.yaw is not None and 1.0 < excess.of_rounding < 2.0 and share > 0.5:
             share /= excess.of_rounding * (1.0 + SPARE)
             continue
         else:

@@ -222,9 +222,9 @@ def _measure(lines, figures, gravity, bounds):
     wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
     wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
     size = gravity
-    fastest = max(end_norm(lines, RATE, 1.0), end_norm(lines, RATE, -1.0)) + thickness(lines, RATE)
-    twist = abs(lines[TWIST, 0]) + abs(lines[TWIST, 1]) + lines[TWIST, 2]
-    uneven = (figures[5] * twist + figures[6] * fastest) * fastest * (1.0 + ROUNDED)
+    # both of a product lie below their chords, and that of these exceeds its ends by at most this
+    spread = abs(end_norm(lines, RATE, 1.0) - end_norm(lines, RATE, -1.0))
+    chords = 0.5 * figures[5] * spread * abs(lines[TWIST, 1])
     for side in range(2):
         way = 2.0 * side - 1.0
         for order in range(2):
@@ -238,13 +238,17 @@ def _measure(lines, figures, gravity, bounds):
         pull = lines[PULL, 0] + way * lines[PULL, 1]
         size = max(size, gravity + thrust + abs(pull) + turning)
         rest = gravity - pull + turning
-        rate = max(end_norm(lines, RATE, way) - thickness(lines, RATE), 0.0)
-        spun = max(abs(lines[TWIST, 0] + way * lines[TWIST, 1]) - lines[TWIST, 2], 0.0)
-        least = (figures[5] * spun + figures[6] * rate) * rate - wide
-        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + least)
-        bounds[0, 3] = max(bounds[0, 3], rest - thrust + least)
-        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + uneven + wide)
-        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + uneven + wide)
+        rate = end_norm(lines, RATE, way)
+        spun = abs(lines[TWIST, 0] + way * lines[TWIST, 1])
+        slow = max(rate - thickness(lines, RATE), 0.0)
+        lower = (figures[5] * max(spun - lines[TWIST, 2], 0.0) + figures[6] * slow) * slow - wide
+        fast = rate + thickness(lines, RATE)
+        upper = (figures[5] * (spun + lines[TWIST, 2]) + figures[6] * fast) * fast
+        upper = (upper + chords + wide) * (1.0 + ROUNDED)
+        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + lower)
+        bounds[0, 3] = max(bounds[0, 3], rest - thrust + lower)
+        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + upper)
+        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + upper)
     for q in range(2, COUNT):
         bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
     for q in range(COUNT):
