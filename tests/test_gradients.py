@@ -17,8 +17,9 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 NAMES = [kind.name for kind in KINDS]
-REACH = 0.05
-"""Of the airframe, m: turning counts as much as thrust in the samples below."""
+FIGURES = np.array([0.05, 0.4, -0.15])
+"""Of the airframe, m, 1/s and 1/s: turning counts as much as thrust in the samples below, and drag
+a little."""
 
 
 # ---- kernels --------------------------------------------------------------------------------
@@ -72,8 +73,8 @@ def call_watch(
 
 
 @kernel
-def call_measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach):
-    measures.measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach)
+def call_measure(kind, samples, squares, count, row, limit, gravity, values, pulls, figures):
+    measures.measure(kind, samples, squares, count, row, limit, gravity, values, pulls, figures)
 
 
 def workspace(count, degree, limits):
@@ -81,7 +82,7 @@ def workspace(count, degree, limits):
         bool(np.isfinite(limits[kinds]).any())
         for kinds in (slice(measures.TURNING, measures.ROTORS), slice(measures.ROTORS, None))
     )
-    return barrier.workspace(count, degree, is_turning, np.array([REACH]) if is_rotors else None)
+    return barrier.workspace(count, degree, is_turning, FIGURES if is_rotors else None)
 
 
 def barrier_of(task, times, limits, *, doublings, samples, reference=1.0, watched=None):
@@ -118,7 +119,7 @@ def measure(name, derivatives, limit):
     call_measure(
         kind, samples, (samples**2).sum(axis=0), count, KINDS[kind].order - 1, limit, GRAVITY,
         values, np.zeros(samples.shape) if kind >= measures.TURNING else None,
-        np.array([REACH]) if kind >= measures.ROTORS else None,
+        FIGURES if kind >= measures.ROTORS else None,
     )  # fmt: skip
     return values
 
@@ -259,7 +260,14 @@ def keeps(name, derivatives, limit):
     if name == "tilt":
         return np.arctan2(np.linalg.norm(thrust[:, :2], axis=1), thrust[:, 2]) / limit
     if name in ROTORS:  # room: what hovering leaves
-        turn = REACH * keeps("angular_acceleration", derivatives, 1.0)
+        reach, drag, along_drag = FIGURES
+        velocity = derivatives[0]
+        carried = derivatives.copy()
+        carried[1:] += drag * derivatives[:-1]
+        thrust = carried[1] + np.array([0.0, 0.0, GRAVITY])
+        size = np.linalg.norm(thrust, axis=1)
+        size = size + along_drag * (thrust * velocity).sum(axis=1) / size
+        turn = reach * keeps("angular_acceleration", carried, 1.0)
         if name == "rotor_thrust":
             return (size + turn) / limit
         return (GRAVITY - size + turn) / limit
@@ -310,7 +318,8 @@ def test_a_measure_is_at_most_one_exactly_where_the_limit_is_kept(name):
     rounded = 0.01 if name in ROTORS else 1e-5 if name in ("tilt", *TURNS) else 1e-12
     clear = np.abs(ratio - 1.0) > rounded  # EASE of rotors
     if name in (*TURNS, *ROTORS):
-        clear &= np.linalg.norm(derivatives[1] + [0.0, 0.0, GRAVITY], axis=1) > 4.0
+        pull = FIGURES[1] * derivatives[0] if name in ROTORS else 0.0
+        clear &= np.linalg.norm(derivatives[1] + pull + [0.0, 0.0, GRAVITY], axis=1) > 4.0
     np.testing.assert_array_equal(values[clear] <= 1.0, ratio[clear] <= 1.0)
     assert 500 < (ratio <= 1.0).sum() < 4500
 

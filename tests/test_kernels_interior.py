@@ -17,9 +17,9 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 LEANING = TURNING = np.ones(1)
-AIRFRAME = Airframe(mass=0.85, inertia=1e-2, lever=0.106)
-"""Its reach makes turning count as much as thrust in the samples below."""
-REACH = np.array([AIRFRAME.reach])
+AIRFRAME = Airframe(mass=0.85, inertia=1e-2, lever=0.106, drag=(0.2, 0.5))
+"""Its reach makes turning count as much as thrust in the samples below, and its drag counts too."""
+FIGURES = AIRFRAME.figures
 NAMES = tuple(kind.name for kind in KINDS)
 LIMITS = np.array([5.0, 15.5, 62.0, 800.0, 0.7, 8.0, 3.0, 25.0, 22.0, 8.0])
 """One for each kind; thrust in the samples below is around gravity."""
@@ -33,17 +33,17 @@ every_kind = pytest.mark.parametrize("kind", range(len(rows.KIND_TERMS)), ids=NA
 
 @kernel
 def call_constrain(
-    kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes, bends
 ):  # fmt: skip
     return rows.constrain(
-        kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes,
+        kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes,
         bends,
     )  # fmt: skip
 
 
 @kernel
-def call_kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out):
-    rows.kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out)
+def call_kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out):
+    rows.kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out)
 
 
 @kernel
@@ -109,7 +109,7 @@ def constrain(kind, samples, limits):
     slopes, bends = np.full((terms + 2, 3, count), NAN), np.full((terms + 2, count), NAN)
     limits = np.broadcast_to(limits, count).copy()
     stretch = call_constrain(
-        kind, LEANING, TURNING, REACH, samples, count, limits, GRAVITY, values, 1, slopes, bends
+        kind, LEANING, TURNING, FIGURES, samples, count, limits, GRAVITY, values, 1, slopes, bends
     )
     for array in (slopes, bends):
         assert np.isnan(array[0]).all()
@@ -119,7 +119,7 @@ def constrain(kind, samples, limits):
 
 def kappa(kind, samples, limit):
     out = np.full(samples.shape[2], NAN)
-    call_kappa(kind, LEANING, TURNING, REACH, samples, samples.shape[2], limit, GRAVITY, out)
+    call_kappa(kind, LEANING, TURNING, FIGURES, samples, samples.shape[2], limit, GRAVITY, out)
     return out
 
 
@@ -152,9 +152,12 @@ def random_samples(count, seed, scale=1.0):
 def plain_values(kind, samples):
     """What a kind limits at each sample, from its definition."""
     v, thrust, j, s = samples.transpose(1, 2, 0)
+    a = thrust - np.array([0.0, 0.0, GRAVITY])
     if kind < 6:
-        a = thrust - np.array([0.0, 0.0, GRAVITY])
         return limited_values([v, a, j, s])[NAMES[kind]]
+    if kind > 7:  # with drag, which the derivatives of the thrust have too
+        drag, along_drag = FIGURES[1:]
+        thrust, j, s = thrust + drag * v, j + drag * a, s + drag * j
     square = (thrust**2).sum(axis=1)
     if kind == 6:
         return np.linalg.norm(np.cross(thrust, j), axis=1) / square
@@ -163,7 +166,9 @@ def plain_values(kind, samples):
     if kind == 7:
         return swing
     rest, sign = (0.0, 1.0) if kind == 8 else (GRAVITY, -1.0)
-    return rest + sign * np.sqrt(square) + AIRFRAME.reach * swing
+    size = np.sqrt(square)
+    size = size + along_drag * (thrust * v).sum(axis=1) / size
+    return rest + sign * size + AIRFRAME.reach * swing
 
 
 def ratio_of(kind, values, limit):
@@ -274,10 +279,14 @@ def test_kappa_is_peak_over_limit(kind):
     error = np.abs(kappa(kind, samples, limit) ** 2 - expected**2)
     tolerance = 1e-12 * expected**2
     if kind > 5:  # WEIGHTLESS leaves a part of what should cancel
-        force, jerk, snap = np.sqrt((samples[:, 1:] ** 2).sum(axis=0))
+        carried = samples[:, 1:].copy()
+        if kind > 7:
+            carried += FIGURES[1] * (samples[:, :-1] - GRAVITY_OF_SAMPLES[:, :-1])
+            speed = np.abs(FIGURES[2]) * np.sqrt((samples[:, 0] ** 2).sum(axis=0))
+        force, jerk, snap = np.sqrt((carried**2).sum(axis=0))
         whole = jerk if kind == 6 else snap + 2.0 * jerk**2 / force
         if kind > 7:
-            whole = AIRFRAME.reach * whole + GRAVITY
+            whole = AIRFRAME.reach * whole + GRAVITY + speed
             tolerance += rows.WEIGHTLESS * (1.0 + (GRAVITY / force) ** 2 * whole / limit) ** 2
         tolerance += 4.0 * rows.WEIGHTLESS * (GRAVITY / force * whole / force / limit) ** 2
     assert (error <= tolerance).all()
@@ -696,8 +705,8 @@ class Case:
         self.grid = unknowns.make_grid(LAYOUTS[name]["degree"], samples)
         limits = np.full(len(LIMITS), NAN)
         limits[list(kinds)] = LIMITS[list(kinds)]
-        reach = REACH if np.isfinite(limits[rows.ROTORS :]).any() else None
-        self.limited = unknowns.make_limited(limits, effort, GRAVITY, reach=reach)
+        figures = FIGURES if np.isfinite(limits[rows.ROTORS :]).any() else None
+        self.limited = unknowns.make_limited(limits, effort, GRAVITY, figures=figures)
         self.work = unknowns.make_work(self.layout, self.grid, self.limited)
         self.rng = np.random.default_rng(seed)
         self.x = random_unknowns(self.layout, seed)

@@ -41,7 +41,7 @@ RACER = Airframe(mass=0.85, inertia=1e-3, lever=0.15 / math.sqrt(2.0))
 RACING = Limits(rotor_thrust=6.879, least_rotor_thrust=0.0, airframe=RACER)
 CRAZYFLIE = Limits(
     rotor_thrust=0.12, least_rotor_thrust=0.0,
-    airframe=Airframe(mass=0.0328, inertia=16.8e-6, lever=0.0325),
+    airframe=Airframe(mass=0.0328, inertia=16.8e-6, lever=0.0325, drag=(0.0147, 0.0128)),
 )  # fmt: skip
 MOST, LEAST = (len(KINDS) - 2, len(KINDS) - 1)
 
@@ -51,13 +51,14 @@ getcontext().prec = 60
 # ---- bounds against the truth ---------------------------------------------------------------
 
 
-def exact_demands(coefficients, duration, reach, places):
-    """(n, 2) |F| + c |alpha| and g - |F| + c |alpha| at normalised times, to 50 digits."""
+def exact_demands(coefficients, duration, figures, places):
+    """(n, 2) T + c |alpha| and g - T + c |alpha| at normalised times, to 50 digits."""
+    reach, drag, along_drag = (Fraction(float(figure)) for figure in figures)
     found = []
     for place in places:
         time = Fraction(float(place)) * Fraction(duration)
         motion = []
-        for order in (2, 3, 4):
+        for order in (1, 2, 3, 4):
             values = [Fraction(0)] * 3
             for j in range(len(coefficients) - 1, order - 1, -1):
                 values = [
@@ -65,7 +66,11 @@ def exact_demands(coefficients, duration, reach, places):
                     for value, x in zip(values, coefficients[j], strict=True)
                 ]
             motion.append(values)
-        thrust, jerk, snap = motion
+        velocity = motion[0]
+        thrust, jerk, snap = (
+            [x + drag * lower for x, lower in zip(*pair, strict=True)]
+            for pair in zip(motion[1:], motion[:-1], strict=True)
+        )
         thrust[2] += Fraction(GRAVITY)
         square = sum(x * x for x in thrust)
         if square == 0:
@@ -75,7 +80,9 @@ def exact_demands(coefficients, duration, reach, places):
         swing = [s - twice * j for s, j in zip(snap, jerk, strict=True)]
         (a, b, c), (x, y, z) = thrust, swing
         turn = (b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2
-        size, turn = root(square), decimal(Fraction(reach)) * root(turn) / decimal(square)
+        size, turn = root(square), decimal(reach) * root(turn) / decimal(square)
+        pull = sum(x * y for x, y in zip(thrust, velocity, strict=True))
+        size += decimal(along_drag * pull) / size
         found.append((size + turn, decimal(Fraction(GRAVITY)) - size + turn))
     return found
 
@@ -88,7 +95,7 @@ def root(value):
     return decimal(value).sqrt()
 
 
-def kernel_bounds(coefficients, duration, values, reach):
+def kernel_bounds(coefficients, duration, values, figures):
     """Upper bound and attained value of both kinds, and where."""
     shape = (1, len(KINDS))
     upper, lower, place = np.empty(shape), np.empty(shape), np.empty(shape)
@@ -97,7 +104,7 @@ def kernel_bounds(coefficients, duration, values, reach):
     limits[[MOST, LEAST]] = values
     bounds.certify(
         coefficients[None], np.array([duration]), limits, GRAVITY, bounds.lookup_tables(degree),
-        TOLERANCE, upper, lower, place, None, None, rotors.workspace(degree, np.array([reach])), 1,
+        TOLERANCE, upper, lower, place, None, None, rotors.workspace(degree, figures), 1,
     )  # fmt: skip
     return upper[0], lower[0], place[0]
 
@@ -106,15 +113,17 @@ def check_pieces(shape, count, seed):
     """Returns how often the bound was shown to be close."""
     close = 0
     for coefficients, duration, rng in nasty_pieces(shape, count, seed):
-        reach = 10.0 ** rng.uniform(-3.0, 0.0)
+        figures = np.array([10.0 ** rng.uniform(-3.0, 0.0), 0.0, 0.0])
+        if rng.uniform() < 0.5:  # with drag
+            figures[1:] = 10.0 ** rng.uniform(-2.0, 0.0), rng.normal() * 0.3
         values = np.array([GRAVITY, GRAVITY]) * 10.0 ** rng.uniform(-1.0, 1.0, size=2)
-        upper, lower, place = kernel_bounds(coefficients, duration, values, reach)
+        upper, lower, place = kernel_bounds(coefficients, duration, values, figures)
         for index, kind in enumerate((MOST, LEAST)):
             limit = Decimal(values[index])
             places = (*np.linspace(0.0, 1.0, 17), place[kind])
-            truths = exact_demands(coefficients, duration, reach, places)
+            truths = exact_demands(coefficients, duration, figures, places)
             truth = max(values[index] for values in truths)
-            where = f"kind {kind} of {coefficients.tolist()} in {duration} s, reach {reach}"
+            where = f"kind {kind} of {coefficients.tolist()} in {duration} s, figures {figures}"
             assert upper[kind] >= lower[kind] >= 0.0, where
             unbounded = upper[kind] == bounds.UNBOUNDED
             assert unbounded or Decimal(upper[kind]) * limit >= truth, where
@@ -304,8 +313,8 @@ WAYPOINTS = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 1.5], [3.0, 2.0, 1.0]])
 
 
 @pytest.mark.parametrize("yaw", [0.0, "velocity", [0.0, 1.0, 2.0]])
-def test_a_yaw_beside_limits_on_rotors_is_refused(yaw):
-    with pytest.raises(InvalidProblem, match="a heading that does not twist"):
+def test_a_yaw_beside_limits_on_rotors_needs_to_know_what_steering_takes(yaw):
+    with pytest.raises(InvalidProblem, match="needs yaw_inertia and torque_per_thrust"):
         Problem(WAYPOINTS, limits=RACING, yaw=yaw)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -11,6 +11,11 @@ from peakflight.errors import InvalidProblem
 
 SMALLEST, LARGEST = 1e-9, 1e9
 """What figures of an airframe may be, in SI units."""
+NUMBERS = ("mass", "inertia", "lever", "yaw_inertia", "torque_per_thrust")
+"""The fields that are a positive number each; the last two may be unknown."""
+
+SPIN = 4
+"""Which of `Airframe.steering` an acceleration about z multiplies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,10 +28,22 @@ class Airframe:
     """Moment of inertia about the roll and the pitch axis, the larger of the two, kg m^2."""
     lever: float
     """Distance of every rotor from the roll axis and from the pitch axis, m."""
+    yaw_inertia: float | None = None
+    """Moment of inertia about the yaw axis, kg m^2; with the next for a nose that is steered."""
+    torque_per_thrust: float | None = None
+    """Torque of a rotor about its axis over its thrust, m."""
+    inertia_difference: float = 0.0
+    """By how much inertia is less about the other one of the roll and pitch axes, kg m^2."""
+    drag: tuple[float, float] = (0.0, 0.0)
+    """Force against the velocity, over it, across and along the thrust, kg/s."""
 
     def __post_init__(self) -> None:
-        for name in ("mass", "inertia", "lever"):
+        if (self.yaw_inertia is None) != (self.torque_per_thrust is None):
+            raise InvalidProblem("airframe has one of yaw_inertia and torque_per_thrust; give both")
+        for name in NUMBERS:
             value = getattr(self, name)
+            if value is None and name in NUMBERS[3:]:
+                continue
             if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
                 raise InvalidProblem(f"airframe {name} is {value!r}; it must be a number")
             if isinstance(value, int) and abs(value) > LARGEST:
@@ -37,10 +54,24 @@ class Airframe:
                     f"airframe {name} is {value!r}; it must be from {SMALLEST:g} to {LARGEST:g}"
                 )
 
+        object.__setattr__(self, "drag", _drag(self.drag))
+        if not 0.0 <= self.inertia_difference < self.inertia:
+            raise InvalidProblem(
+                f"airframe inertia_difference is {self.inertia_difference!r}; it must be from 0 to "
+                f"below the inertia, {self.inertia:g}"
+            )
+
     def is_near(self, other: "Airframe") -> bool:
         """Whether two airframes are the same but for rounding."""
-        pairs = zip(astuple(self), astuple(other), strict=True)
-        return all(math.isclose(one, two, rel_tol=1e-9) for one, two in pairs)
+        pairs = [(getattr(self, name), getattr(other, name)) for name in NUMBERS]
+        pairs += zip(self.drag, other.drag, strict=True)
+        uneven = abs(self.inertia_difference - other.inertia_difference)
+        if not uneven <= 1e-9 * self.inertia:
+            return False
+        return all(
+            one is two or (None not in (one, two) and math.isclose(one, two, rel_tol=1e-9))
+            for one, two in pairs
+        )
 
     @property
     def reach(self) -> float:
@@ -50,10 +81,62 @@ class Airframe:
         """
         return math.sqrt(2.0) * self.inertia / (self.lever * self.mass)
 
+    @property
+    def figures(self) -> np.ndarray:
+        """(3,) c, delta and epsilon of `kernels.rotors`: reach, m, and drag over mass, 1/s."""
+        across, along = self.drag
+        return np.array([self.reach, across / self.mass, (along - across) / self.mass])
+
+    @property
+    def can_steer(self) -> bool:
+        """Whether it is known what turning about the yaw axis takes."""
+        return self.yaw_inertia is not None
+
+    @property
+    def steering(self) -> np.ndarray:
+        """(7,) what `kernels.twisting` takes, where turning about z counts.
+
+        After the `figures`, the ratio of the moments of inertia; the collective acceleration that
+        an angular acceleration of 1 rad/s^2 about z takes from a rotor, m; and what unequal inertia
+        across z takes: of a product with the rate about z, m, and of a squared rate across it, m.
+        """
+        if self.yaw_inertia is None or self.torque_per_thrust is None:
+            raise InvalidProblem("airframe has no yaw_inertia and torque_per_thrust")
+        spin = self.yaw_inertia / (self.torque_per_thrust * self.mass)
+        ratio, uneven = self.yaw_inertia / self.inertia, self.inertia_difference
+        twisting = (1.0 + ratio) * uneven / self.inertia * self.reach
+        crossed = 0.5 * uneven / (self.torque_per_thrust * self.mass)
+        return np.array([*self.figures, ratio, spin, twisting, crossed])
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is known, by name, from which `from_dict` makes the same."""
+        values = {name: getattr(self, name) for name in NUMBERS}
+        known: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
+        if self.inertia_difference:
+            known["inertia_difference"] = self.inertia_difference
+        return {**known, "drag": list(self.drag)} if any(self.drag) else known
+
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Airframe by the names of its fields, as `dataclasses.asdict` gives them."""
-        known = [field.name for field in fields(cls)]
-        if not isinstance(values, Mapping) or sorted(values) != sorted(known):
-            raise InvalidProblem(f"airframe is {values!r}; it must have {', '.join(known)}")
+        """Airframe by the names of its fields; those that have a default may be left out."""
+        if not isinstance(values, Mapping) or not set(NUMBERS[:3]) <= set(values) <= {
+            *NUMBERS, "inertia_difference", "drag",
+        }:  # fmt: skip
+            raise InvalidProblem(
+                f"airframe is {values!r}; it must have {', '.join(NUMBERS[:3])}, and may have "
+                f"{', '.join(NUMBERS[3:])}, inertia_difference and drag"
+            )
         return cls(**values)
+
+
+def _drag(values: Any) -> tuple[float, float]:
+    try:
+        across, along = (float(value) for value in values)
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidProblem(f"airframe drag is {values!r}; it must be two numbers") from None
+    for value in (across, along):
+        if not 0.0 <= value <= LARGEST:
+            raise InvalidProblem(
+                f"airframe drag is {values!r}; both must be from 0 to {LARGEST:g} kg/s"
+            )
+    return across, along

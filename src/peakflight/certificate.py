@@ -18,6 +18,7 @@ from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
+from peakflight.twist_certificate import certify_twist
 from peakflight.yaw_certificate import certify_yaw
 
 JUMP_OF_LIMIT = 1e-4
@@ -136,6 +137,13 @@ def certify_answer(
     counts = (1,) * len(trajectory) if pieces is None else pieces
     passed = trajectory.breakpoints[np.concatenate(([0], np.cumsum(counts)))]
     peaks, problems = certify_yaw(problem.heading, yaw, trajectory, passed)
+    if problem.heading.is_about_body or problem.limits.on_rotors:
+        twisted, exceeding = certify_twist(problem, problem.heading, yaw, trajectory)
+        twisted = {  # of limits on rotors, what holds without twisting is proven as well
+            name: np.maximum(kappa, report.peaks.get(name, kappa))
+            for name, kappa in twisted.items()
+        }
+        peaks, problems = peaks | twisted, problems + exceeding
     return replace(
         report,
         feasible=report.feasible and not problems,
@@ -168,7 +176,7 @@ def stretch_to_limits(trajectory: Trajectory, limits: Limits) -> tuple[Trajector
     The certified trajectory and alpha, or None if no alpha keeps the limits.
     """
     _check_axes(trajectory)
-    eased = 1.0 if limits.reach is None else _ease(trajectory, limits)
+    eased = 1.0 if limits.figures is None else _ease(trajectory, limits)
     start = trajectory if eased == 1.0 else trajectory.stretch(eased)
     coefficients, times = fresh(start.coefficients), fresh(start.segment_times)
     upper = np.empty((len(times), len(KINDS)))
@@ -232,7 +240,7 @@ def _arguments(
         np.empty_like(upper),
         bounds.quotients_workspace(degree) if limits.on_leaning else None,
         turning.workspace(degree) if limits.on_turning else None,
-        None if limits.reach is None else rotors.workspace(degree, limits.reach),
+        None if limits.figures is None else rotors.workspace(degree, limits.figures),
     )
 
 

@@ -5,16 +5,16 @@ in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joi
 `kernels/bounds.py` (what the certificate proves). Everything else, from the report to the command
 line, goes through `KINDS`.
 
-Rotor thrusts follow from the motion and the airframe, for the worst heading. With F = a + g e3, the
-angular acceleration alpha of its direction and the airframe's reach c, every rotor of a vehicle of
-mass m that does not twist about its thrust, with equal inertias about roll and pitch and no drag,
-gives between m (|F| - c |alpha|) / 4 and m (|F| + c |alpha|) / 4. A yaw that is held or steered
-twists the vehicle, which takes more.
+Rotor thrusts follow from the motion and the airframe, for the worst heading. With the thrust T, of
+which drag is a part, the angular acceleration alpha of its direction and the airframe's reach c,
+every rotor of a vehicle of mass m that does not twist about its thrust gives between
+(T - m c |alpha|) / 4 and (T + m c |alpha|) / 4 (`kernels.rotors`). A yaw that is held or steered
+twists the vehicle, which takes more: `twist_certificate` proves that.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -169,11 +169,16 @@ class Limits:
         return any(getattr(self, name) is not None for name in ROTORS)
 
     @property
-    def reach(self) -> np.ndarray | None:
-        """(1,) of the airframe, m, where rotor thrust is limited; else kernels leave it out."""
+    def figures(self) -> np.ndarray | None:
+        """(3,) of the airframe where rotor thrust is limited; else kernels leave it out."""
         if self.airframe is None or not self.on_rotors:
             return None
-        return np.array([self.airframe.reach])
+        return self.airframe.figures
+
+    @property
+    def can_steer(self) -> bool:
+        """Whether the airframe says what turning about its z axis takes."""
+        return self.airframe is not None and self.airframe.can_steer
 
     def as_array(self) -> np.ndarray:
         """What kernels hold kinds to, shape (len(KINDS),); NaN where nothing is limited.
@@ -192,6 +197,30 @@ class Limits:
             values[[most, least]] *= 4.0 / self.airframe.mass
             values[least] = GRAVITY - values[least]
         return values
+
+    def sparing(self, demands: Mapping[str, float]) -> Self:
+        """The same, with a part of the rotors' range kept free at either end, for a yaw to take.
+
+        demands: name of a limit on rotors to N; at most half of what hovering leaves is kept free.
+        """
+        if self.airframe is None:
+            return self
+        hover = self.airframe.mass * GRAVITY / 4.0
+        changed = {}
+        for name, demand in demands.items():
+            limit = getattr(self, name)
+            towards = hover - limit
+            changed[name] = limit + math.copysign(min(demand, 0.5 * abs(towards)), towards)
+        return replace(self, **changed)
+
+    @property
+    def rotor_rooms(self) -> dict[str, float]:
+        """Name of each limit on rotors that is set to how far it is from hovering, N."""
+        if self.airframe is None:
+            return {}
+        hover = self.airframe.mass * GRAVITY / 4.0
+        values = {name: getattr(self, name) for name in ROTORS}
+        return {name: abs(hover - value) for name, value in values.items() if value is not None}
 
     def ratios(self, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Kappa of the kinds that are set, from `limited_values` of the same airframe."""
@@ -226,7 +255,7 @@ class Limits:
         """The limits that are set, by name, and the airframe if there is one."""
         values: dict[str, Any] = {kind.name: getattr(self, kind.name) for kind in self.active}
         if self.airframe is not None:
-            values["airframe"] = asdict(self.airframe)
+            values["airframe"] = self.airframe.to_dict()
         return values
 
     @classmethod
@@ -272,14 +301,15 @@ def limited_values(
         values["body_rate"] = _turn(thrust, derivatives[2])
     if len(derivatives) >= 4:
         jerk = derivatives[2]
-        square = (thrust * thrust).sum(axis=-1, keepdims=True)
-        along = 2.0 * (thrust * jerk).sum(axis=-1, keepdims=True)
-        along = along / np.where(square > 0.0, square, np.inf)
-        values["angular_acceleration"] = _turn(thrust, derivatives[3] - along * jerk)
+        values["angular_acceleration"] = _swing(thrust, jerk, derivatives[3])
     if len(derivatives) >= 4 and airframe is not None:
-        turning = airframe.reach * values["angular_acceleration"]
+        reach, drag, along_drag = airframe.figures
+        force = thrust + drag * derivatives[0]
+        turning = reach * _swing(force, jerk + drag * derivatives[1], derivatives[3] + drag * jerk)
+        size = np.linalg.norm(force, axis=-1)
+        pull = (force * derivatives[0]).sum(axis=-1) / np.where(size > 0.0, size, np.inf)
         for name, sign in zip(ROTORS, (1.0, -1.0), strict=True):
-            values[name] = airframe.mass / 4.0 * (values["thrust_acceleration"] + sign * turning)
+            values[name] = airframe.mass / 4.0 * (size + along_drag * pull + sign * turning)
     return values
 
 
@@ -293,6 +323,14 @@ def plain_unit(unit: str) -> str:
     for power, raised in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
         unit = unit.replace(power, raised)
     return unit
+
+
+def _swing(thrust: np.ndarray, jerk: np.ndarray, snap: np.ndarray) -> np.ndarray:
+    """|F x (s - 2 (F.j / F.F) j)| / F.F of (..., 3) arrays, as `_turn`."""
+    square = (thrust * thrust).sum(axis=-1, keepdims=True)
+    along = 2.0 * (thrust * jerk).sum(axis=-1, keepdims=True)
+    along = along / np.where(square > 0.0, square, np.inf)
+    return _turn(thrust, snap - along * jerk)
 
 
 def _turn(thrust: np.ndarray, motion: np.ndarray) -> np.ndarray:

@@ -1,32 +1,32 @@
 """From a problem to a certified plan: tidy, solve, certify."""
 
 import logging
-import math
 import time
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from peakflight import methods
-from peakflight.certificate import certify_answer
 from peakflight.course import Course, tidy
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
 from peakflight.problem import Problem, as_float_array
-from peakflight.result import Plan, Report
-from peakflight.trajectory import Trajectory
+from peakflight.result import Plan
+from peakflight.steering import Steered, steered
 from peakflight.version import __version__
 from peakflight.yaw import as_heading
 
 _log = logging.getLogger("peakflight")
 
-SLOWER = 1.05
-"""Factor by which a flight is slowed down further where the yaw's stretch exceeds other limits."""
-SLOWER_ROUNDS = 40
-"""Most such steps: seven times as slow."""
+RESERVES = 3
+"""Most times that a problem is solved again with less of the rotors' range."""
+EASED = 1.1
+"""Thrust that is set aside then, over what was lacking."""
+ENOUGH = 1.003
+"""A flight that the yaw makes longer by less than this factor is not solved again."""
 
 
 def plan(
@@ -88,10 +88,9 @@ def plan(
         settings = replace(settings, **tuning)  # type: ignore[type-var]
     with jit.announced(module.kernels(problem, settings), _log):
         impossible = _contradiction(problem)
-        outcome = module.solve(problem, settings)
+        outcome, flight = _answered(module, problem, settings)
         problem = outcome.problem or problem
         pieces = outcome.pieces or (1,) * (len(problem.waypoints) - 1)
-        flight = _certified(problem, outcome.trajectory, pieces)
     report = flight.report
     status = Status.INFEASIBLE if flight.too_fast else outcome.status
     if not report.feasible and status is not Status.INFEASIBLE:
@@ -154,50 +153,40 @@ def replan(
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 
-class _Flight(NamedTuple):
-    """A trajectory with the yaw that is asked for, and the proof of both."""
+def _answered(
+    module: methods.Method, problem: Problem, settings: Any
+) -> tuple[methods.Outcome, Steered]:
+    """Solve a problem and add its yaw.
 
-    trajectory: Trajectory
-    report: Report
-    yaw: Trajectory | None = None
-    deviation: float = 0.0
-    """Of the yaw from what it follows, rad."""
-    note: str = ""
-    """What the yaw has cost, in words."""
-    too_fast: bool = False
-    """Whether it would have to be slower for the yaw, but motion is fixed at a waypoint."""
+    What turning about z takes of the rotors, the method does not know. Where they lack it, the
+    problem is solved again within so much less of their range, and the fastest flight is taken.
+    """
+    outcome = module.solve(problem, settings)
+    answers = [_with_yaw(problem, outcome)]
+    narrow = problem
+    for _ in range(RESERVES):
+        lacking = answers[-1][1].lacking
+        longer = answers[-1][1].trajectory.duration / outcome.trajectory.duration
+        if not lacking or (answers[-1][1].report.feasible and longer < ENOUGH):
+            break
+        spared = {name: EASED * demand for name, demand in lacking.items()}
+        narrow = replace(narrow, limits=narrow.limits.sparing(spared))
+        outcome = module.solve(narrow, settings)
+        answers.append(_with_yaw(problem, outcome))
+    return min(
+        answers,
+        key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
+    )
 
 
-def _certified(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -> _Flight:
-    """Add the yaw, slow the flight down as far as its limits need it, and certify both."""
-    if problem.heading is None:
-        return _Flight(trajectory, certify_answer(problem, trajectory, pieces))
-    from peakflight.yaw_motion import turning
-
-    yaw, stretch, deviation = turning(problem, trajectory, pieces)
-    too_fast = stretch > 1.0 and not problem.is_at_rest
-    note = ""
-    if problem.heading.follows:
-        note = f"the yaw is up to {math.degrees(deviation):.3g} deg off the direction it follows"
-    if too_fast:
-        note = (
-            f"the yaw limits need a flight {stretch:.4g} times as long, which the motion that is "
-            "fixed at waypoints does not allow"
-        )
-        yaw, stretch = yaw and yaw.stretch(1.0 / stretch), 1.0
-    flight = trajectory if stretch == 1.0 else trajectory.stretch(stretch)
-    report = certify_answer(problem, flight, pieces, yaw=yaw)
-    if stretch > 1.0 and yaw is not None:
-        # Slowing down keeps most limits by itself, but those on least thrust and on turning may
-        # first be exceeded, and are kept again where the flight is slow enough.
-        for _ in range(SLOWER_ROUNDS):
-            if report.feasible:
-                break
-            stretch, yaw = stretch * SLOWER, yaw.stretch(SLOWER)
-            flight = trajectory.stretch(stretch)
-            report = certify_answer(problem, flight, pieces, yaw=yaw)
-        note = f"slowed down by {100.0 * (stretch - 1.0):.3g} % for the yaw limits"
-    return _Flight(flight, report, yaw, deviation, note, too_fast)
+def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outcome, Steered]:
+    """A flight with its yaw, under the limits of the problem that it answers."""
+    if outcome.problem is not None and outcome.problem.limits != problem.limits:
+        whole = replace(outcome.problem, limits=problem.limits)
+        outcome = replace(outcome, problem=whole)
+    answered = outcome.problem or problem
+    pieces = outcome.pieces or (1,) * (len(answered.waypoints) - 1)
+    return outcome, steered(answered, outcome.trajectory, pieces)
 
 
 def _fields(kind: Any) -> set[str]:

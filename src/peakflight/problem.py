@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from peakflight.airframe import Airframe
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, LimitKind, Limits
 from peakflight.vehicle import Vehicle
@@ -177,10 +178,10 @@ class Problem:
         spline_class = self.spline_class
         if self.yaw is not None:
             object.__setattr__(self, "yaw", _yaw(self.yaw, legs + 1))
-            if self.limits.on_rotors:
+            if self.limits.on_rotors and not self.limits.can_steer:
                 raise InvalidProblem(
-                    "limits on rotors are proven for a heading that does not twist about the "
-                    "thrust; leave yaw out, or limit thrust and angular acceleration instead"
+                    "a yaw beside limits on rotors needs yaw_inertia and torque_per_thrust of the "
+                    "airframe"
                 )
         rest = spline_class.end_orders
         for name in ("start", "end"):
@@ -221,17 +222,32 @@ class Problem:
 
     @cached_property
     def heading(self) -> Heading | None:
-        """What is asked of the yaw; of an array, to pass it without limits. None for nothing."""
-        if self.yaw is None or isinstance(self.yaw, Heading):
-            return self.yaw
+        """What is asked of the yaw; of an array, to pass it without limits. None for nothing.
+
+        Where rotor thrust is limited, a nose about which nothing is said is free, and limits that
+        are not said to be about the yaw are about the body.
+        """
+        rotors = self.limits.on_rotors and self.limits.can_steer
+        if self.yaw is None:
+            return Heading(policy="free", rate=None, acceleration=None) if rotors else None
+        if isinstance(self.yaw, Heading):
+            return replace(self.yaw, about="body") if rotors and not self.yaw.about else self.yaw
         angles = tuple(np.asarray(self.yaw).tolist())
-        return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None)
+        about = "body" if rotors else None
+        return Heading(policy="waypoints", angles=angles, rate=None, acceleration=None, about=about)
 
     @cached_property
     def allowed(self) -> dict[LimitKind, float]:
         """Every kind that is limited, of the flight and of its yaw, with the limit in its unit."""
         flight = {kind: getattr(self.limits, kind.name) for kind in self.limits.active}
         return flight if self.heading is None else flight | self.heading.limits
+
+    @cached_property
+    def airframe(self) -> Airframe | None:
+        """What is known of what flies: of the limits on rotors, or else of the vehicle."""
+        if self.limits.airframe is not None or self.vehicle is None:
+            return self.limits.airframe
+        return self.vehicle.airframe  # type: ignore[union-attr]
 
     @property
     def leg_lengths(self) -> np.ndarray:

@@ -213,6 +213,22 @@ class Trajectory:
         coefficients = _shift_origin(self.coefficients[parent], offset)
         return type(self)(coefficients, times, self.start_time)
 
+    def cut(self, times: ArrayLike) -> Self:
+        """The same motion, with joints at (n,) more times as well, which lie strictly inside."""
+        more = np.asarray(times, dtype=float)
+        if not ((more > self.start_time) & (more < self.end_time)).all():
+            raise ValueError(f"cannot cut outside of {self.start_time:g} to {self.end_time:g} s")
+        begins = np.union1d(self.breakpoints[:-1], more)
+        parent = np.searchsorted(self.breakpoints[1:-1], begins, side="right")
+        ends = np.append(begins[1:], self.end_time)
+        whole = np.diff(parent, prepend=-1, append=len(self))  # pieces that stay keep their time
+        stays = (whole[:-1] > 0) & (whole[1:] > 0)
+        durations = np.where(stays, self.segment_times[parent], ends - begins)
+        coefficients = _shift_origin(
+            self.coefficients[parent], begins - self.breakpoints[:-1][parent]
+        )
+        return type(self)(coefficients, durations, self.start_time)
+
     def join(self, other: Self) -> Self:
         """Append `other`, moved in time to follow at once.
 

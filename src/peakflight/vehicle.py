@@ -174,6 +174,10 @@ class Vehicle:
             mass=self.mass,
             inertia=max(self.inertia[:2]),
             lever=math.sqrt(2.0) / (ROTORS * most),
+            yaw_inertia=self.inertia[2],
+            torque_per_thrust=1.0 / (ROTORS * float(np.abs(self.mixer[:, 3]).max())),
+            inertia_difference=abs(self.inertia[0] - self.inertia[1]),
+            drag=self.drag,
         )
 
     def with_limits(self, limits: Limits) -> Self:

@@ -16,9 +16,18 @@ YAW_KINDS = (
     LimitKind("yaw_acceleration", "rad/s^2", 2, "yaw acceleration"),
 )
 """What is limited of the yaw, by order of derivative."""
-ALL_LABELS = LABELS | {kind.name: kind.label for kind in YAW_KINDS}
+BODY_KINDS = (
+    LimitKind("body_rate_z", "rad/s", 1, "body rate about z"),
+    LimitKind("angular_acceleration_z", "rad/s^2", 2, "angular acceleration about z"),
+)
+"""What is limited instead where limits are about the body."""
+ABOUT = {"yaw": YAW_KINDS, "body": BODY_KINDS}
+"""What the limits of a heading can be about, to the kinds that they are then."""
+FIELDS = ("rate", "acceleration")
+"""The fields of a heading that limit these kinds, by order of derivative."""
+ALL_LABELS = LABELS | {kind.name: kind.label for kinds in ABOUT.values() for kind in kinds}
 """Name of any limit to what it is called in tables and on axes."""
-ASKED = {"fixed": "angle", "waypoints": "angles", "velocity": None, "point": "point"}
+ASKED = {"fixed": "angle", "waypoints": "angles", "velocity": None, "point": "point", "free": None}
 """Policy to the field that it needs."""
 FARTHEST_ANGLE = 1e4
 """Largest angle, rad: beyond, too few digits of it are left."""
@@ -37,7 +46,8 @@ class Heading:
     """
 
     policy: str
-    """"fixed", "waypoints", "velocity" or "point"."""
+    """"fixed", "waypoints", "velocity", "point", or "free": the nose is left where it ends up when
+    the vehicle does not turn about its thrust."""
     angle: float | None = None
     """Of policy fixed: yaw during the whole flight, rad."""
     angles: tuple[float, ...] | None = None
@@ -51,6 +61,10 @@ class Heading:
     """Fastest that the rate may change, rad/s^2; None does not limit. By default the nose reaches
     the default rate in 0.15 s; yaw is the weakest axis of a quadrotor, which the drag of its rotors
     alone turns."""
+    about: str | None = None
+    """What rate and acceleration are those of: "yaw", the angle; or "body", the vehicle about its
+    own z axis (omega_z), which is what gyro and rotors feel, and differs where the thrust swings
+    while it leans. None is "body" for a free nose and where rotor thrust is limited, else "yaw"."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.policy, str) or self.policy not in ASKED:
@@ -76,8 +90,14 @@ class Heading:
             if len(point) != 3:
                 raise InvalidProblem(f"the yaw point has {len(point)} numbers; it must have 3")
             object.__setattr__(self, "point", point)
-        for kind in YAW_KINDS:
-            limit = getattr(self, heading_field(kind))
+        if not (self.about is None or self.about in ABOUT):
+            raise InvalidProblem(
+                f"yaw limits are about {self.about!r}; it must be {' or '.join(ABOUT)}"
+            )
+        if self.policy == "free" and self.about == "yaw":
+            raise InvalidProblem("a free nose is limited about the body; leave about out")
+        for kind, name in zip(self.kinds, FIELDS, strict=True):
+            limit = getattr(self, name)
             if limit is not None:
                 value = _finite(f"limit {kind.name}", limit, LARGEST)
                 if not value >= SMALLEST:
@@ -85,18 +105,34 @@ class Heading:
                         f"limit {kind.name} is {value:g}; it must be positive, from {SMALLEST:g} "
                         f"to {LARGEST:g}"
                     )
-                object.__setattr__(self, heading_field(kind), value)
+                object.__setattr__(self, name, value)
+
+    @property
+    def kinds(self) -> tuple[LimitKind, ...]:
+        """What rate and acceleration limit, of the two in `ABOUT`."""
+        return ABOUT[self.about or ("body" if self.policy == "free" else "yaw")]
+
+    @property
+    def is_about_body(self) -> bool:
+        """Whether rate and acceleration are those of the vehicle about its own z axis."""
+        return self.kinds is BODY_KINDS
 
     @property
     def limits(self) -> dict[LimitKind, float]:
-        """The kinds of `YAW_KINDS` that are limited, with their limits."""
-        values = {kind: getattr(self, heading_field(kind)) for kind in YAW_KINDS}
-        return {kind: value for kind, value in values.items() if value is not None}
+        """The kinds that are limited, with their limits."""
+        values = (getattr(self, name) for name in FIELDS)
+        pairs = zip(self.kinds, values, strict=True)
+        return {kind: value for kind, value in pairs if value is not None}
 
     @property
     def follows(self) -> bool:
         """Whether it is a target that is followed as closely as the limits allow."""
         return self.policy in ("velocity", "point")
+
+    def within(self, share: float) -> Self:
+        """The same with a part of what its limits allow."""
+        values = {name: getattr(self, name) for name in FIELDS}
+        return replace(self, **{name: value and share * value for name, value in values.items()})
 
     def with_angles(self, angles: np.ndarray | None) -> Self:
         """The same with (K+1,) other angles, if it has any."""
@@ -107,7 +143,7 @@ class Heading:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and names, from which `from_dict` makes the same heading."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        kept = (*filter(None, ASKED.values()),)
+        kept = (*filter(None, ASKED.values()), "about")
         return {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in values.items()
@@ -125,7 +161,7 @@ class Heading:
                 f"{', '.join(field.name for field in fields(cls))}"
             )
         if "policy" not in values:
-            needing = [policy for policy, name in ASKED.items() if name in values]
+            needing = [policy for policy, name in ASKED.items() if name and name in values]
             if len(needing) != 1:
                 raise InvalidProblem(f"yaw names no policy; known are {', '.join(ASKED)}")
             values["policy"] = needing[0]
@@ -162,11 +198,6 @@ def unwrapped(angles: np.ndarray) -> np.ndarray:
     """
     turns = np.pi - np.mod(np.pi - np.diff(angles), 2.0 * np.pi)
     return angles[0] + np.concatenate(([0.0], np.cumsum(turns)))
-
-
-def heading_field(kind: LimitKind) -> str:
-    """The field of a heading that limits a kind."""
-    return kind.name.removeprefix("yaw_")
 
 
 def _numbers(name: str, values: Any) -> list[Any]:

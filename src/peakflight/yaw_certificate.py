@@ -2,23 +2,27 @@
 
 Nothing here is shared with what makes the motion. If a yaw has degree 3 at most, the largest rate
 of a piece is at an end or at the one vertex, and the largest acceleration at an end; the rounding
-error of each value is bounded and added.
+error of each value is bounded and added. Limits that are about the body take the flight as well:
+`twist_certificate` proves them, for any degree.
 """
 
 import numpy as np
 
+from peakflight.kernels.bernstein import falling_factorials
+from peakflight.limits import LimitKind
 from peakflight.result import JOINT_TOLERANCE
 from peakflight.trajectory import Trajectory
 from peakflight.yaw import Heading
 
 DEGREE = 3
-"""Highest of a yaw motion that can be proven."""
+"""Highest of a yaw motion of which limits on its own rate and acceleration can be proven."""
 ROUNDING = 16.0 * 2.220446049250313e-16
 """Error of a value of degree 3 or a derivative of it, relative to the sum of its terms' sizes."""
 JUMP_OF_LIMIT = 1e-4
 """A jump may have this part of the limit on what jumps, however short the pieces."""
 SMALLEST_JUMP = 1e-10
-"""Largest jump of an angle, rad, but for rounding."""
+"""Largest jump of an angle, rad, but for rounding; and one of a rate or an acceleration, in rad/s
+or rad/s^2, that is nothing."""
 ANGLE_TOLERANCE = 1e-8
 """Largest miss of an angle that is asked for, rad."""
 TIME_TOLERANCE = 1e-9
@@ -33,8 +37,9 @@ def certify_yaw(
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Prove that a yaw motion keeps the limits of a heading and does what can be proven of it.
 
-    The limits; that neither yaw nor rate nor acceleration jumps; that it begins and ends with the
-    flight, at rate zero; that it holds a fixed yaw and passes that of each waypoint. How near it
+    That it begins and ends with the flight; that neither yaw nor rate jumps; that it holds a fixed
+    yaw and passes that of each waypoint. Of limits on its own rate and acceleration: that they are
+    kept, that the acceleration does not jump, and that the rate is zero at both ends. How near it
     comes to a direction that is followed is not proven.
 
     Parameters
@@ -48,34 +53,41 @@ def certify_yaw(
     wrong, one line each.
     """
     slack = TIME_TOLERANCE * flight.duration
-    unfit = _unfit(yaw, flight, slack)
-    if yaw is None or unfit:
+    misfit = unfit(heading, yaw, flight)
+    own = {} if heading.is_about_body else heading.limits
+    if yaw is None or misfit:
         unknown = np.full(len(flight), UNBOUNDED)
-        return {kind.name: unknown for kind in heading.limits}, [unfit]
-    coefficients = np.zeros((len(yaw), DEGREE + 1))
-    coefficients[:, : yaw.degree + 1] = yaw.coefficients[:, :, 0]
+        return {kind.name: unknown for kind in heading.limits}, [misfit]
+    coefficients = yaw.elevate(max(DEGREE, yaw.degree)).coefficients[:, :, 0]
     peaks, problems = {}, []
-    for kind, limit in heading.limits.items():
+    for kind, limit in own.items():
         largest = _largest(coefficients, yaw.segment_times, kind.order)
         kappa = _by_segment(largest, yaw.breakpoints, flight.breakpoints, slack) / limit
         peaks[kind.name] = kappa * (1.0 + ROUNDING)
-        if not kappa.max() <= 1.0:
-            segment = int(kappa.argmax())
-            problems.append(
-                f"{kind.label} reaches {kappa[segment]:.6g} times its limit of {limit:g} "
-                f"{kind.unit} in segment {segment}"
-            )
+        problems += exceeded(kind, limit, peaks[kind.name])
     problems += _jumps(coefficients, yaw.segment_times, heading)
     problems += _missed(heading, yaw, waypoint_times)
     return peaks, problems
 
 
-def _unfit(yaw: Trajectory | None, flight: Trajectory, slack: float) -> str:
+def exceeded(kind: LimitKind, limit: float, kappa: np.ndarray) -> list[str]:
+    """A line that says by how much and where a limit is not kept; none if it is."""
+    if kappa.max() <= 1.0:
+        return []
+    segment = int(kappa.argmax())
+    return [
+        f"{kind.label} reaches {kappa[segment]:.6g} times its limit of {limit:g} {kind.unit} in "
+        f"segment {segment}"
+    ]
+
+
+def unfit(heading: Heading, yaw: Trajectory | None, flight: Trajectory) -> str:
     """Why nothing can be proven about a yaw motion; empty if something can."""
     if yaw is None:
         return "there is no yaw motion"
-    if yaw.degree > DEGREE:
+    if yaw.degree > DEGREE and not heading.is_about_body:
         return f"the yaw has degree {yaw.degree}; {DEGREE} is the most that can be proven"
+    slack = TIME_TOLERANCE * flight.duration
     ends = np.array([yaw.start_time - flight.start_time, yaw.end_time - flight.end_time])
     if not np.abs(ends).max() <= slack:
         return (
@@ -114,25 +126,29 @@ def _by_segment(
 
 def _jumps(coefficients: np.ndarray, times: np.ndarray, heading: Heading) -> list[str]:
     """Where yaw, rate or acceleration jumps, or the rate is not zero at an end."""
-    powers = times[:, None] ** np.arange(DEGREE + 1)
-    factors = np.array([[1.0, 1.0, 1.0, 1.0], [0.0, 1.0, 2.0, 3.0], [0.0, 0.0, 2.0, 6.0]])
+    count = coefficients.shape[1]
+    powers = times[:, None] ** np.arange(count)
+    factors = falling_factorials(count - 1)
     sizes = (np.abs(coefficients) * powers).sum(axis=1)
     caps = {kind.order: JUMP_OF_LIMIT * limit for kind, limit in heading.limits.items()}
     caps[0] = SMALLEST_JUMP + ROUNDING * float(sizes.max())  # small ones add up over many pieces
     lines = []
-    for order, what in enumerate(WHAT):
+    # where the snap of a flight jumps, so does what keeps the body from turning about z
+    smooth = WHAT[:2] if heading.is_about_body else WHAT
+    for order, what in enumerate(smooth):
         begins = factors[order, order] * coefficients[:, order]
-        ends = (factors[order, order:] * coefficients[:, order:] * powers[:, : 4 - order]).sum(
+        ends = (factors[order, order:] * coefficients[:, order:] * powers[:, : count - order]).sum(
             axis=1
         )
         allowed = np.minimum(JOINT_TOLERANCE * sizes / times**order, caps.get(order, np.inf))
+        allowed = np.maximum(allowed, SMALLEST_JUMP)
         jumps = np.abs(begins[1:] - ends[:-1])
         wrong = ~(jumps <= np.maximum(allowed[1:], allowed[:-1]))
         if wrong.any():
             joint = int(wrong.argmax())
             lines.append(f"{what} jumps by {jumps[joint]:.3g} at the end of its piece {joint}")
         at_ends = np.abs([begins[0], ends[-1]])
-        if order == 1 and not (at_ends <= allowed[[0, -1]]).all():
+        if order == 1 and len(smooth) > 2 and not (at_ends <= allowed[[0, -1]]).all():
             lines.append(
                 f"{what} is {at_ends.max():.3g} rad/s at an end of the flight; it must be 0"
             )

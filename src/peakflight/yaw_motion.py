@@ -4,17 +4,23 @@ Every piece of the flight is cut into even parts, whose borders are the knots of
 Yaw rate and acceleration are linear in its control points and lie in the hull of theirs, so limits
 at every instant are limits on differences of control points: a convex quadratic program whose
 matrices are bands, solved in linear time (`peakflight.banded_program`).
+
+Where limits are about the body, that spline is what is added to the yaw at which the vehicle does
+not turn about its thrust (`peakflight.twist`): its rate and acceleration are those of the body.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from peakflight.airframe import SPIN
 from peakflight.banded_program import Bounds, least_scale, least_squares
 from peakflight.problem import Problem
 from peakflight.trajectory import Trajectory
+from peakflight.twist import untwisted
 from peakflight.yaw import Heading, unwrapped
 
 SPACING = 0.05
@@ -36,12 +42,17 @@ BRISK = 0.1
 """Part of the largest horizontal speed, or distance, at which a sample has half its weight."""
 CAUTION = 1e-4
 """How much further than needed a flight is slowed down, relative: it leaves room to be smooth."""
+SPARED = 0.05
+"""Part of what hovering leaves of a rotor's range, at the nearer end, that turning about z to
+follow a direction may take: the nose rather lags than slows the flight down."""
 SAFETY = 1e-7
 """Part of a limit that is left to rounding; the certificate knows nothing of it."""
 ROUNDS = 30
 """Most linear programs to the smallest stretch; 2 to 8 are usual."""
 CLOSENESS = 1e-7
 """Relative change of the stretch at which that ends."""
+FINER = 2
+"""Parts of the yaw without turning to one of the spline that is added to it."""
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 
@@ -51,12 +62,15 @@ class Turning(NamedTuple):
     yaw: Trajectory | None
     """One axis, rad, on knots of its own; None if none was found."""
     stretch: float
-    """How much slower the flight has to be for it, 1 if not at all; `yaw` is for that flight."""
+    """How much slower the flight has to be for it, 1 if not at all; `yaw` is for that flight, or
+    None where it has to be found anew then."""
     deviation: float
     """Largest difference from what is followed, rad; 0 if waypoints or a fixed yaw are met."""
 
 
-def turning(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -> Turning:
+def turning(
+    problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...], *, share: float = 1.0
+) -> Turning:
     """The yaw that a problem asks for along a trajectory.
 
     Parameters
@@ -67,6 +81,8 @@ def turning(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -
         (K,) pieces in three axes that answer it.
     pieces
         (legs,) how many pieces each leg has.
+    share
+        Part of the limits that may be used.
     """
     heading = problem.heading
     assert heading is not None
@@ -75,10 +91,38 @@ def turning(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -
         yaw = Trajectory(constant, [trajectory.duration], trajectory.start_time)  # type: ignore[arg-type]
         return Turning(yaw, 1.0, 0.0)
     spline = _Spline.of(trajectory.segment_times)
+    heading = _sparing(problem, heading).within(share)
+    free = None
+    if heading.is_about_body:
+        free = untwisted(trajectory, FINER * np.diff(spline.firsts), problem.airframe)
+        if heading.policy == "free":
+            return Turning(free, 1.0, 0.0)
     if heading.angles is not None:
         marks = spline.firsts[np.concatenate(([0], np.cumsum(pieces)))]
-        return _through(heading, spline, marks, unwrapped(np.array(heading.angles)), trajectory)
-    return _following(heading, spline, trajectory)
+        angles = np.array(heading.angles)
+        if free is not None:
+            angles = angles - free(_clipped(free, free.start_time + spline.knots[3 + marks]))[:, 0]
+        found = _through(heading, spline, marks, unwrapped(angles), trajectory)
+    else:
+        found = _following(heading, spline, trajectory, free)
+    if free is None or found.yaw is None:
+        return found
+    if found.stretch > 1.0:  # a slower flight swings its thrust otherwise
+        return found._replace(yaw=None)
+    added = found.yaw.subdivide(FINER).elevate(free.degree).coefficients
+    whole = Trajectory(free.coefficients + added, free.segment_times, free.start_time)
+    return found._replace(yaw=whole)
+
+
+def _sparing(problem: Problem, heading: Heading) -> Heading:
+    """A heading that follows, changing its rate no faster than `SPARED` of the rotors gives."""
+    rooms, airframe = problem.limits.rotor_rooms, problem.limits.airframe
+    if not (rooms and heading.follows and heading.is_about_body and airframe is not None):
+        return heading
+    spin = float(airframe.steering[SPIN])
+    most = SPARED * min(rooms.values()) * 4.0 / (airframe.mass * spin)
+    given = heading.acceleration
+    return replace(heading, acceleration=most if given is None else min(given, most))
 
 
 def _through(
@@ -136,10 +180,14 @@ def _least_scale(bounds: Bounds, order: np.ndarray, enough: float) -> float:
     return last
 
 
-def _following(heading: Heading, spline: "_Spline", trajectory: Trajectory) -> Turning:
-    """The yaw nearest to the direction of the velocity, or to a point."""
+def _following(
+    heading: Heading, spline: "_Spline", trajectory: Trajectory, base: Trajectory | None
+) -> Turning:
+    """The yaw nearest to the direction of the velocity, or to a point; less the base's, if any."""
     times = sample_times(spline.parts)
     target, trust = followed(heading, trajectory, trajectory.start_time + times)
+    if base is not None:
+        target = target - base(_clipped(base, base.start_time + times))[:, 0]
     free = spline.at_rest()
     basis = spline.basis(times)
     weights = np.sqrt(trust * np.repeat(spline.parts, SAMPLES) / SAMPLES)
@@ -169,7 +217,7 @@ def followed(
     heading: Heading, trajectory: Trajectory, times: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The direction that a heading follows at (n,) s, and its weights, both as `directions`."""
-    times = np.clip(times, trajectory.start_time, trajectory.end_time)
+    times = _clipped(trajectory, times)
     if heading.point is None:
         return directions(trajectory(times, derivative=1)[:, :2])
     return directions(np.array(heading.point[:2]) - trajectory(times)[:, :2])
@@ -191,6 +239,10 @@ def directions(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     last[last < 0] = int(known.argmax())
     square = (lengths / longest) ** 2
     return unwrapped(angles[last]), np.maximum(square / (square + BRISK**2), FAITH)
+
+
+def _clipped(motion: Trajectory, times: np.ndarray) -> np.ndarray:
+    return np.clip(times, motion.start_time, motion.end_time)
 
 
 def _bounds(

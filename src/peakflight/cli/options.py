@@ -90,7 +90,7 @@ def vehicle_option(command: _Command) -> _Command:
         is_eager=True,
         callback=_remember,
         help="Limit the vehicle's rotors, and its body rate across the thrust, themselves, without "
-        "a margin, in place of its default limits; for a heading that does not twist.",
+        "a margin, in place of its default limits.",
     )(command)
     return click.option(
         "--vehicle",

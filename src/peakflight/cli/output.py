@@ -107,10 +107,8 @@ def rotor_notes(problem: Problem) -> tuple[str, ...]:
     """What limits on rotors are proven for, if there are any."""
     if not problem.limits.on_rotors:
         return ()
-    return (
-        "rotor thrusts are proven for a heading that does not twist about the thrust, equal "
-        "inertias and no drag; a yaw that is held takes more",
-    )
+    nose = "the yaw of the plan" if problem.heading else "a heading that does not twist"
+    return (f"rotor thrusts are proven for {nose}, with drag",)
 
 
 def ratio_cells(ratio: float) -> tuple[str, str, str]:

@@ -1,4 +1,4 @@
-"""Yaw, its rate and its acceleration against time, with the limits."""
+"""Yaw, and its rate and acceleration or those of the body about z, against time and limits."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ from peakflight.figures.derivatives import (
 )
 from peakflight.limits import plain_unit
 from peakflight.result import Plan
-from peakflight.yaw import YAW_KINDS
+from peakflight.twist import turning_about_z
 
 HEIGHTS = (1.7, 1.05, 1.05)
 """Of the panels from the top, in."""
@@ -42,12 +42,13 @@ NOTES = {
     "waypoints": "○ asked for at waypoints",
     "velocity": "light: the direction of the velocity",
     "point": "light: the direction of the point",
+    "free": "free: the vehicle does not turn about its thrust",
 }
 """What a policy is, on top of the figure."""
 
 
 def yaw_figure(plan: Plan) -> Figure:
-    """Draw the yaw with what is asked of it, its rate and its acceleration against time.
+    """Draw the yaw with what is asked of it, and what is limited: its own rate or the body's.
 
     Legs are numbered from 0 on top; dashed lines are limits.
 
@@ -76,10 +77,13 @@ def yaw_figure(plan: Plan) -> Figure:
     panels[-1].set_xlabel("time (s)", fontsize=TEXT, color=INK)
     number_legs(panels[0], plan.waypoint_times)
     _draw_yaw(panels[0], plan, times)
-    for kind, axes in zip(YAW_KINDS, panels[1:], strict=True):
+    if heading.is_about_body:
+        curves = turning_about_z(plan.trajectory, plan.yaw_motion, times, plan.problem.airframe)
+    else:
+        curves = plan.yaw(times, derivative=1), plan.yaw(times, derivative=2)
+    for kind, axes, values in zip(heading.kinds, panels[1:], curves, strict=True):
         unit = plain_unit(kind.unit)
-        _name(axes, f"{kind.label}\n({unit})")
-        values = plan.yaw(times, derivative=kind.order)
+        _name(axes, f"{kind.label.replace(' about z', chr(10) + 'about z')}\n({unit})")
         axes.plot(times, values, color=INK, linewidth=1.0, zorder=3)
         _draw_limit(axes, float(np.abs(values).max()), heading.limits.get(kind), unit)
     return figure

@@ -39,12 +39,12 @@ BATCH = 64
 
 
 def workspace(
-    count: int, degree: int, turning: bool, reach: np.ndarray | None
+    count: int, degree: int, turning: bool, figures: np.ndarray | None
 ) -> tuple[np.ndarray | None, ...]:
     """Scratch arrays of `evaluate` for a number of pieces.
 
     turning: whether kinds from TURNING on are limited; if not, kernels are compiled without them.
-    Likewise the reach of the airframe: None if no rotor thrust is limited.
+    Likewise the figures of `kernels.rotors`: None if no rotor thrust is limited.
     """
     batch = (3, 4, BATCH)
     return (
@@ -58,8 +58,8 @@ def workspace(
         np.zeros(BATCH),
         np.zeros(EXPONENTS.size, dtype=np.bool_),
         np.zeros(4, dtype=np.bool_),
-        np.zeros(batch) if turning or reach is not None else None,
-        reach,
+        np.zeros(batch) if turning or figures is not None else None,
+        figures,
     )
 
 
@@ -74,9 +74,20 @@ def evaluate(
     (N, 4, S) of `basis.sample_tables`; watched (K, kinds): see `watch`; doublings:
     p = 24 * 2^doublings.
     """
-    data, slope, samples, squares, weights, vertical, values, grown, kinds, orders, pulls, reach = (
-        work
-    )
+    (
+        data,
+        slope,
+        samples,
+        squares,
+        weights,
+        vertical,
+        values,
+        grown,
+        kinds,
+        orders,
+        pulls,
+        figures,
+    ) = work
     power = BASE_POWER * 2.0**doublings
     floor = np.exp(NEGLIGIBLE / power)  # of m^(1/e)
     cap = np.exp(CAP / power)
@@ -109,7 +120,9 @@ def evaluate(
             if not kinds[kind]:
                 continue
             row = KIND_ORDERS[kind] - 1
-            measure(kind, samples, squares, count, row, limits[kind], gravity, values, pulls, reach)
+            measure(
+                kind, samples, squares, count, row, limits[kind], gravity, values, pulls, figures
+            )
             if _count_above(values, count, floor ** EXPONENTS[kind]) == 0:
                 continue
             if highest < 0:
@@ -120,7 +133,7 @@ def evaluate(
             barrier += _raise(values, count, EXPONENTS[kind], power, doublings, capped, grown)
             add_slopes(
                 kind, samples, squares, count, row, limits[kind], gravity, values, grown,
-                weights, vertical, pulls, reach,
+                weights, vertical, pulls, figures,
             )  # fmt: skip
         for row in range(lowest, highest + 1):
             _pull(samples, weights, vertical, pulls, count, row)
@@ -141,7 +154,7 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
     less the times will change, and the nearer a limit must be. Returns how many limits are exceeded
     that were not watched before.
     """
-    data, _, samples, squares, _, _, values, _, _, orders, pulls, reach = work
+    data, _, samples, squares, _, _, values, _, _, orders, pulls, figures = work
     nearest = 1.0 - WATCH / np.sqrt(BASE_POWER * 2.0**doublings)
     missed = 0
     count = values.size  # BATCH, but not as a literal, for which callees compile once more
@@ -155,7 +168,16 @@ def watch(rows, times, limits, gravity, tables, doublings, work, watched):
             if limits[kind] > 0.0:
                 row = KIND_ORDERS[kind] - 1
                 measure(
-                    kind, samples, squares, count, row, limits[kind], gravity, values, pulls, reach
+                    kind,
+                    samples,
+                    squares,
+                    count,
+                    row,
+                    limits[kind],
+                    gravity,
+                    values,
+                    pulls,
+                    figures,
                 )
                 if not watched[k, kind] and _count_above(values, count, 1.0) > 0:
                     missed += 1

@@ -187,15 +187,15 @@ def _needed(kind, coefficients, piece, time, place, limits, gravity, factorials,
         pass
     elif kind >= ROTORS:
         return required_stretch(
-            order, _sign(kind), rotors[3][0], coefficients, piece, time, place, limits[kind],
+            order, _sign(kind), rotors[3], coefficients, piece, time, place, limits[kind],
             gravity, factorials, rotors[2],
         )  # fmt: skip
     if turns is None:
         pass
     elif kind >= TURNING:
         return required_stretch(
-            order, 0.0, 0.0, coefficients, piece, time, place, limits[kind], gravity, factorials,
-            turns[2],
+            order, 0.0, turns[3], coefficients, piece, time, place, limits[kind], gravity,
+            factorials, turns[2],
         )  # fmt: skip
     x = 0.0
     y = 0.0

@@ -79,7 +79,7 @@ class Limited(NamedTuple):
     kernels are compiled."""
     turning: np.ndarray | None
     """Some number if how the thrust direction turns is limited; None likewise."""
-    reach: np.ndarray | None
+    figures: np.ndarray | None
     """(1,) of the airframe, m, if rotor thrust is limited; None likewise."""
     several: np.ndarray | None
     """Some number if a kind has more than one term; None likewise."""
@@ -148,7 +148,7 @@ def evaluate(layout, grid, limited, work, x):
             own = max(
                 own,
                 rows.constrain(
-                    limited.kinds[r], limited.leaning, limited.turning, limited.reach,
+                    limited.kinds[r], limited.leaning, limited.turning, limited.figures,
                     work.samples[k], count, work.limits[k, r], limited.gravity[0],
                     work.values[k, r], limited.first[r], work.slopes[k], work.bends[k],
                 ),
@@ -394,11 +394,11 @@ def lower(layout, grid, limited, work, x, slowly):
         for r in range(limited.kinds.size):
             kind, limit = limited.kinds[r], limited.values[r]
             rows.kappa(
-                kind, limited.leaning, limited.turning, limited.reach, near, count * cells, limit,
+                kind, limited.leaning, limited.turning, limited.figures, near, count * cells, limit,
                 limited.gravity[0], around,
             )  # fmt: skip
             rows.kappa(
-                kind, limited.leaning, limited.turning, limited.reach, work.samples[k], count,
+                kind, limited.leaning, limited.turning, limited.figures, work.samples[k], count,
                 limit, limited.gravity[0], there,
             )  # fmt: skip
             for q in range(count):

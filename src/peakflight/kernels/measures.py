@@ -23,7 +23,7 @@ EXPONENTS = np.array([2, 2, 6, 8, 2, 2, 6, 8, 2, 2])
 """e of each kind."""
 KIND_ORDERS = np.array([1, 2, 3, 4, 2, 2, 3, 4, 4, 4])
 """The highest derivative that each kind is about."""
-LOWEST_ORDERS = np.array([1, 2, 3, 4, 2, 2, 2, 2, 2, 2])
+LOWEST_ORDERS = np.array([1, 2, 3, 4, 2, 2, 2, 2, 1, 1])
 """The lowest."""
 TURNING = 6
 """Kinds from here on are about how the thrust direction turns."""
@@ -42,17 +42,17 @@ GUARD = 1e-3
 
 
 @inner
-def measure(kind, samples, squares, count, row, limit, gravity, values, pulls, reach):
+def measure(kind, samples, squares, count, row, limit, gravity, values, pulls, figures):
     """Values <- m of the first `count` samples.
 
     samples (3, 4, S) are derivatives 1 to 4, squares (4, S) their squared norms; row: which
-    derivative the kind is about, less one; pulls, reach: as in `add_slopes`.
+    derivative the kind is about, less one; pulls, figures: as in `add_slopes`.
     """
-    if reach is None:
+    if figures is None:
         pass
     elif kind >= ROTORS:
         sign = 1.0 if kind == ROTORS else -1.0
-        _demand(sign, samples, count, limit, gravity, reach[0], values)
+        _demand(sign, samples, count, limit, gravity, figures, values)
         return
     if pulls is None:
         pass
@@ -72,19 +72,19 @@ def measure(kind, samples, squares, count, row, limit, gravity, values, pulls, r
 @inner
 def add_slopes(
     kind, samples, squares, count, row, limit, gravity, values, grown, weights, vertical,
-    pulls, reach,
+    pulls, figures,
 ):  # fmt: skip
     """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m.
 
     Kinds from TURNING on add to pulls (3, 4, S) instead; it is None where none of them is limited,
-    which is known when the kernel is compiled. So is the reach (1,) of the airframe: None where no
-    rotor thrust is limited.
+    which is known when the kernel is compiled. So are the figures (3,) of `kernels.rotors`:
+    None where no rotor thrust is limited.
     """
-    if reach is None:
+    if figures is None:
         pass
     elif kind >= ROTORS:
         sign = 1.0 if kind == ROTORS else -1.0
-        _add_demand(sign, samples, count, limit, gravity, reach[0], values, grown, pulls)
+        _add_demand(sign, samples, count, limit, gravity, figures, values, grown, pulls)
         return
     if pulls is None:
         pass
@@ -262,41 +262,71 @@ def _pull_turn(samples, q, row, gravity, weight, square, pulls):
 
 
 @vector
-def _load(sign, samples, q, gravity, reach):
-    """1 / |F|, +-(|F| - g), c |alpha| (rounded by EASE) and |alpha|^2 of a sample."""
-    fx = samples[0, 1, q]
-    fy = samples[1, 1, q]
-    fz = samples[2, 1, q] + gravity
-    thrust = np.sqrt(fx * fx + fy * fy + fz * fz + TINY)
-    square = _turn_of(samples, q, 3, gravity)
-    swing = np.sqrt(reach * reach * square + (EASE * gravity) ** 2)
-    return 1.0 / thrust, sign * (thrust - gravity), swing, square
+def _with_drag(samples, count, drag):
+    """(3, 4, count) velocity, F less gravity with drag, and its two derivatives."""
+    out = np.empty((3, 4, count))
+    for x in range(3):
+        for q in range(count):
+            out[x, 0, q] = samples[x, 0, q]
+        for row in range(1, 4):
+            for q in range(count):
+                out[x, row, q] = samples[x, row, q] + drag * samples[x, row - 1, q]
+    return out
 
 
 @vector
-def _demand(sign, samples, count, limit, gravity, reach, values):
+def _load(sign, samples, q, gravity, figures):
+    """1 / |F|, F.v / F.F, +-(T - g), c |alpha| (rounded by EASE) and |alpha|^2 of a sample.
+
+    Of `_with_drag`; T = |F| + epsilon b.v, all as in `kernels.rotors`.
+    """
+    fx = samples[0, 1, q]
+    fy = samples[1, 1, q]
+    fz = samples[2, 1, q] + gravity
+    square = fx * fx + fy * fy + fz * fz + TINY
+    norm = np.sqrt(square)
+    moved = (fx * samples[0, 0, q] + fy * samples[1, 0, q] + fz * samples[2, 0, q]) / square
+    turn = _turn_of(samples, q, 3, gravity)
+    swing = np.sqrt(figures[0] * figures[0] * turn + (EASE * gravity) ** 2)
+    over = sign * (norm * (1.0 + figures[2] * moved) - gravity)
+    return 1.0 / norm, moved, over, swing, turn
+
+
+@vector
+def _demand(sign, samples, count, limit, gravity, figures, values):
     """Square of the stretch at which a rotor would be at its limit, if demands scaled as below.
 
-    What is limited is +-(|F| - g) + c |alpha|, with c the reach of the airframe: at most the room
-    that hovering leaves. Stretched by x^(-1/2), it is about the first times x and the second times
-    x^2; 1/x solves room/x^2 - (+-(|F| - g))/x - c |alpha| = 0.
+    What is limited is +-(T - g) + c |alpha|, with T as in `_load` and c the reach of the airframe:
+    at most the room that hovering leaves. Stretched by x^(-1/2), it is about the first times x and
+    the second times x^2; 1/x solves room/x^2 - (+-(T - g))/x - c |alpha| = 0.
     """
     room = limit - gravity if sign > 0.0 else limit
+    carried = _with_drag(samples, count, figures[1])
     for q in range(count):
-        _, over, swing, _ = _load(sign, samples, q, gravity, reach)
+        _, _, over, swing, _ = _load(sign, carried, q, gravity, figures)
         values[q] = (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room)
 
 
 @vector
-def _add_demand(sign, samples, count, limit, gravity, reach, values, grown, pulls):
+def _add_demand(sign, samples, count, limit, gravity, figures, values, grown, pulls):
     room = limit - gravity if sign > 0.0 else limit
+    carried = _with_drag(samples, count, figures[1])
+    own = np.zeros((3, 4, count))
     for q in range(count):
-        inverse, over, swing, square = _load(sign, samples, q, gravity, reach)
+        inverse, moved, over, swing, square = _load(sign, carried, q, gravity, figures)
         root = np.sqrt(over * over + 4.0 * room * swing)
         push = 0.5 * grown[q] / root
         along = sign * inverse * push
-        pulls[0, 1, q] += along * samples[0, 1, q]
-        pulls[1, 1, q] += along * samples[1, 1, q]
-        pulls[2, 1, q] += along * (samples[2, 1, q] + gravity)
-        weight = 0.5 * push / (values[q] + TINY) * reach * reach * square / swing
-        _pull_turn(samples, q, 3, gravity, weight, square, pulls)
+        for x in range(3):
+            thrust = carried[x, 1, q] + (gravity if x == 2 else 0.0)
+            own[x, 0, q] = along * figures[2] * thrust
+            own[x, 1, q] = along * (thrust + figures[2] * (carried[x, 0, q] - moved * thrust))
+        weight = 0.5 * push / (values[q] + TINY) * figures[0] * figures[0] * square / swing
+        _pull_turn(carried, q, 3, gravity, weight, square, own)
+    for x in range(3):
+        for row in range(4):
+            for q in range(count):
+                pulls[x, row, q] += own[x, row, q]
+        for row in range(3):
+            for q in range(count):
+                pulls[x, row, q] += figures[1] * own[x, row + 1, q]

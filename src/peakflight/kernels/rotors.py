@@ -1,24 +1,42 @@
 """Certified upper bounds of what rotor thrusts are about, over whole pieces.
 
-With F = a + g e3, jerk j, snap s and the angular acceleration of the thrust direction
+With drag d across and e along the thrust of a vehicle of mass m, both in proportion to the
+velocity, the thrust is m (|F| + epsilon b.v) along b = F / |F|, where
 
-    alpha = F x (s - 2 (F.j / F.F) j) / F.F,
+    F = a + g e3 + delta v,  delta = d / m,  epsilon = (e - d) / m,
 
-rotor thrusts are limited by |F| + c |alpha|, from above, and by g - |F| + c |alpha|, which is large
-where the least of them is small. There is no polynomial whose maximum these are: norms are added.
+and with j and s the derivatives of F, the angular acceleration of its direction is
 
-On an interval every component of F, j and s lies within a radius of a line, and arithmetic on such
-lines (`_times`, `_inverse`) gives a line and a radius for every component of alpha. Norms are
-convex: that of a line lies below its chord, and |F| above its part along any direction, which is
-linear again. So the largest of two ends plus the radii is a bound, and what it is above the truth
-falls with the square of the interval's length. Subdivision closes it as in `turning`. Rounding is
-part of the radii.
+    alpha = F x (s - 2 (F.j / F.F) j) / F.F.
+
+Rotor thrusts are limited by |F| + epsilon b.v + c |alpha|, from above, and by
+g - |F| - epsilon b.v + c |alpha|, which is large where the least of them is small. There is no
+polynomial whose maximum these are: norms are added.
+
+On an interval every component of F, j, s and v lies within a radius of a line, and arithmetic on
+such lines (`kernels.lines`) gives a line and a radius for all the rest. Norms are convex: that of a
+line lies below its chord, and |F| above its part along any direction, which is linear again. So the
+largest of two ends plus the radii is a bound, and what it is above the truth falls with the square
+of the interval's length. Subdivision closes it as in `turning`. Rounding is part of the radii.
 """
 
 import numpy as np
 
 from peakflight.kernels.bernstein import EPSILON, control_points
 from peakflight.kernels.jit import inner
+from peakflight.kernels.lines import (
+    ROUNDED,
+    cross,
+    dot,
+    drawn,
+    end_norm,
+    inverse_root,
+    keep,
+    line,
+    plus,
+    thickness,
+    times,
+)
 from peakflight.kernels.turning import DEPTH, NESTING, motion_at, split
 
 SPLITS = 2000
@@ -33,41 +51,43 @@ REFINEMENTS, LOOKS, CLOSER = 6, 3, 0.3
 they are each time."""
 SMALLEST = 1e-290
 """What underflows is not zero: added to bounds."""
-ROUNDED = 8.0 * EPSILON
-"""Rounding of a line, relative to the sizes of what it was made of; and of a radius."""
 
 
-def workspace(degree: int, reach: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Scratch arrays: intervals that wait; lines; a motion at a point. And the reach (1,), m."""
-    n = max(degree - 2, 0)
-    return np.empty((DEPTH + 3, n + 1, 9)), np.empty((12, 3)), np.empty((3, 3)), reach
+F, JERK, SNAP, TURN, SPEED, AXIS, PULL, LINES = 0, 3, 6, 9, 12, 15, 18, 19
+"""Rows of lines: F, j and s, of which s is then what alpha is about; alpha, v, b, epsilon b.v."""
+
+
+def workspace(degree: int, figures: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Scratch arrays: intervals that wait; lines; a motion at a point. And figures (3,): c in m,
+    delta and epsilon in 1/s.
+    """
+    n = max(degree - 1, 0)
+    return np.empty((DEPTH + 3, n + 1, 12)), np.empty((LINES, 3)), np.empty((4, 3)), figures
 
 
 @inner
 def largest_demand(
     sign, limit, coefficients, piece, time, gravity, tables, tolerance, points, rotors, ends
 ):
-    """Bounds of the largest |F| + c |alpha| (sign 1) or g - |F| + c |alpha| (-1) over a piece.
+    """Bounds of the largest demand from above (sign 1) or below (-1), see the top, over a piece.
 
     Closed to a tolerance that is relative to the limit, or to the value if that is larger. tables:
     as in `bounds`; points (n+1, 3), rotors (`workspace`) and ends (depth, 4) are scratch. Returns
     an attained value (but for rounding), at least 0, an upper bound, and where.
     """
-    stack, lines, motion, reach = rotors
+    stack, lines, motion, figures = rotors
     degree = stack.shape[1] - 1
-    errors = np.zeros(3)
-    sizes = np.zeros(3)
-    for vector in range(3):
-        errors[vector], sizes[vector] = control_points(
-            coefficients, piece, time, vector + 2, degree, gravity if vector == 0 else 0.0,
-            tables[0], tables[2], points,
-        )  # fmt: skip
-        if not errors[vector] < np.inf:  # overflow, or not a number
-            return np.inf, np.inf, 0.0
-        for i in range(degree + 1):
-            for d in range(3):
-                stack[0, i, 3 * vector + d] = points[i, d]
-    low, place = _attained(sign, coefficients, piece, time, reach[0], gravity, tables[2], motion)
+    errors = np.zeros(4)
+    sizes = np.zeros(4)
+    if not control_columns(
+        coefficients, piece, time, figures[1], gravity, tables[0], tables[2], points, stack, errors,
+        sizes,
+    ):  # fmt: skip
+        return np.inf, np.inf, 0.0
+    point = np.empty(12)
+    low, place = _attained(
+        sign, coefficients, piece, time, figures, gravity, tables[2], motion, point
+    )
     high = 0.0
     splits = 0
     waiting = 1
@@ -79,12 +99,12 @@ def largest_demand(
         waiting -= 1
         nesting = ends[waiting, 2]
         bound = np.inf
-        if _draw(stack, waiting, degree, errors, sizes, nesting, lines):
-            bound = _bound(sign, lines, reach[0], gravity)
+        if draw(stack, waiting, degree, errors, sizes, nesting, figures[2], lines):
+            bound = _bound(sign, lines, figures[0], gravity)
         size = max(low, limit)
         gap = bound - max(
-            _demand(sign, stack[waiting, 0], reach[0], gravity, 0.0),
-            _demand(sign, stack[waiting, degree], reach[0], gravity, 0.0),
+            _demand(sign, stack[waiting, 0], figures, gravity),
+            _demand(sign, stack[waiting, degree], figures, gravity),
         )
         if (
             bound <= low + tolerance * size
@@ -106,7 +126,7 @@ def largest_demand(
         ends[waiting + 1, 2] = nesting + 1.0
         ends[waiting, 3] = gap
         ends[waiting + 1, 3] = gap
-        value = _demand(sign, stack[waiting, 0], reach[0], gravity, 0.0)
+        value = _demand(sign, stack[waiting, 0], figures, gravity)
         if low < value < np.inf:
             low = value
             place = middle
@@ -116,7 +136,41 @@ def largest_demand(
 
 
 @inner
-def _attained(sign, coefficients, piece, time, reach, gravity, factorials, motion):
+def control_columns(
+    coefficients, piece, time, drag, gravity, convert, factorials, points, stack, errors, sizes
+):
+    """stack[0] <- control points of F, j, s and v, three columns each, in (n+1, 12).
+
+    errors, sizes (4,) <- bounds of their errors and sizes. Returns whether there are such.
+    """
+    degree = stack.shape[1] - 1
+    for order in range(1, 5):
+        row = (order + 2) % 4  # v last
+        errors[row], sizes[row] = control_points(
+            coefficients, piece, time, order, degree, 0.0, convert, factorials, points
+        )
+        if not errors[row] < np.inf:  # overflow, or not a number
+            return False
+        for i in range(degree + 1):
+            for d in range(3):
+                stack[0, i, 3 * row + d] = points[i, d]
+    for row in (2, 1, 0):
+        lower = (row + 3) % 4
+        for i in range(degree + 1):
+            for d in range(3):
+                stack[0, i, 3 * row + d] += drag * stack[0, i, 3 * lower + d]
+        sizes[row] += drag * sizes[lower]
+        errors[row] += drag * errors[lower]
+    for i in range(degree + 1):
+        stack[0, i, 2] += gravity
+    sizes[0] += gravity
+    for row in range(3):
+        errors[row] += 4.0 * EPSILON * sizes[row]
+    return True
+
+
+@inner
+def _attained(sign, coefficients, piece, time, figures, gravity, factorials, motion, point):
     """A value near the maximum of what is limited, at least 0, and where it is attained."""
     low = 0.0
     place = 0.0
@@ -127,7 +181,12 @@ def _attained(sign, coefficients, piece, time, reach, gravity, factorials, motio
         for i in range(-half, half + 1):
             at = min(max(centre + i * step, 0.0), 1.0)
             motion_at(4, coefficients, piece, at * time, factorials, motion)
-            value = _demand(sign, motion.reshape(-1), reach, gravity, gravity)
+            for d in range(3):
+                point[9 + d] = motion[0, d]
+                for row in range(3):
+                    point[3 * row + d] = motion[row + 1, d] + figures[1] * motion[row, d]
+            point[2] += gravity
+            value = _demand(sign, point, figures, gravity)
             if low < value < np.inf:
                 low = value
                 place = at
@@ -138,11 +197,11 @@ def _attained(sign, coefficients, piece, time, reach, gravity, factorials, motio
 
 
 @inner
-def _demand(sign, point, reach, gravity, lift):
-    """What is limited, of a motion (9,): acceleration with `lift` added to get F, jerk and snap."""
+def _demand(sign, point, figures, gravity):
+    """What is limited, of F, j, s and v (12,)."""
     x = point[0]
     y = point[1]
-    z = point[2] + lift
+    z = point[2]
     square = x * x + y * y + z * z
     twice = 2.0 * (x * point[3] + y * point[4] + z * point[5]) / square
     u = point[6] - twice * point[3]
@@ -151,143 +210,70 @@ def _demand(sign, point, reach, gravity, lift):
     e = y * w - z * v
     f = z * u - x * w
     h = x * v - y * u
-    turn = reach * np.sqrt(e * e + f * f + h * h) / square
+    turn = figures[0] * np.sqrt(e * e + f * f + h * h) / square
+    thrust = np.sqrt(square)
+    thrust += figures[2] * (x * point[9] + y * point[10] + z * point[11]) / thrust
     rest = gravity if sign < 0.0 else 0.0
-    return rest + sign * np.sqrt(square) + turn
+    return rest + sign * thrust + turn
 
 
 @inner
-def _draw(stack, row, degree, errors, sizes, nesting, lines):
-    """Lines <- centre, slope and radius of each component of F, j, s and alpha on an interval.
+def draw(stack, row, degree, errors, sizes, nesting, along_drag, lines):
+    """Lines <- all of the rows at the top on an interval; along_drag: epsilon.
 
     The slope is by a variable from -1 to 1. Returns whether there is thrust all along: without it
-    alpha is not drawn.
+    the rest is not drawn.
     """
-    for c in range(9):
-        first = stack[row, 0, c]
-        last = stack[row, degree, c]
-        below = 0.0
-        above = 0.0
-        for i in range(1, degree):
-            off = stack[row, i, c] - (first + i * (last - first) / degree)
-            below = min(below, off)
-            above = max(above, off)
+    for c in range(12):
         vector = c // 3
         # each subdivision rounds `degree` sums, by half an EPSILON of the size
         lost = errors[vector] + (degree * nesting + 16.0) * EPSILON * sizes[vector]
-        lines[c, 0] = 0.5 * (first + last) + 0.5 * (below + above)
-        lines[c, 1] = 0.5 * (last - first)
-        lines[c, 2] = 0.5 * (above - below) + lost
-    square = _dot(lines, 0, 0)
-    inverse = _inverse(square)
-    if not inverse[2] < np.inf:
+        keep(lines, c if c < 9 else c + 3, drawn(stack, row, c, degree, lost))
+    share = inverse_root(dot(lines, F, F))
+    if not share[2] < np.inf:
         return False
-    twice = _times(_dot(lines, 0, 3), inverse)
+    square = times(share, share)
+    twice = times(dot(lines, F, JERK), square)
     twice = (-2.0 * twice[0], -2.0 * twice[1], 2.0 * twice[2])
     for d in range(3):  # s - 2 (F.j / F.F) j, in place of s
-        swing = _plus(_line(lines, 6 + d), _times(twice, _line(lines, 3 + d)))
-        _keep(lines, 6 + d, swing)
+        swing = plus(line(lines, SNAP + d), times(twice, line(lines, JERK + d)))
+        keep(lines, SNAP + d, swing)
+    cross(lines, F, SNAP, TURN)
     for d in range(3):
-        e = (d + 1) % 3
-        f = (d + 2) % 3
-        one = _times(_line(lines, e), _line(lines, 6 + f))
-        other = _times(_line(lines, f), _line(lines, 6 + e))
-        turn = _plus(one, (-other[0], -other[1], other[2]))
-        _keep(lines, 9 + d, _times(turn, inverse))
+        keep(lines, TURN + d, times(line(lines, TURN + d), square))
+        keep(lines, AXIS + d, times(line(lines, F + d), share))
+    pull = dot(lines, AXIS, SPEED)
+    size = abs(pull[0]) + abs(pull[1]) + pull[2]
+    radius = abs(along_drag) * (pull[2] + ROUNDED * size)
+    keep(lines, PULL, (along_drag * pull[0], along_drag * pull[1], radius))
     return True
 
 
 @inner
 def _bound(sign, lines, reach, gravity):
     """Upper bound of what is limited, from the lines of F and alpha."""
-    thrust_radius = 0.0
-    turn_radius = 0.0
-    centre = 0.0
-    for d in range(3):
-        thrust_radius += lines[d, 2] * lines[d, 2]
-        turn_radius += lines[9 + d, 2] * lines[9 + d, 2]
-        centre += lines[d, 0] * lines[d, 0]
-    centre = np.sqrt(centre) * (1.0 + ROUNDED)
+    centre = np.sqrt(lines[0, 0] ** 2 + lines[1, 0] ** 2 + lines[2, 0] ** 2) * (1.0 + ROUNDED)
     bound = -np.inf
     size = gravity
     for side in range(2):
         way = 2.0 * side - 1.0
-        thrust = 0.0
-        turn = 0.0
-        along = 0.0
-        for d in range(3):
-            end = lines[d, 0] + way * lines[d, 1]
-            thrust += end * end
-            along += lines[d, 0] * end
-            end = lines[9 + d, 0] + way * lines[9 + d, 1]
-            turn += end * end
-        thrust = np.sqrt(thrust)
-        turn = reach * np.sqrt(turn)
-        size = max(size, gravity + thrust + turn)
+        thrust = end_norm(lines, F, way)
+        turn = reach * end_norm(lines, TURN, way)
+        pull = lines[PULL, 0] + way * lines[PULL, 1]
+        size = max(size, gravity + thrust + abs(pull) + turn)
         if sign > 0.0:
-            bound = max(bound, thrust + turn)
+            bound = max(bound, thrust + pull + turn)
         else:
-            bound = max(bound, gravity - along / centre + turn)
-    bound += np.sqrt(thrust_radius) + reach * np.sqrt(turn_radius)
+            bound = max(bound, gravity - along(lines, way) / centre - pull + turn)
+    bound += thickness(lines, F) + lines[PULL, 2] + reach * thickness(lines, TURN)
     bound = bound * (1.0 + ROUNDED) + 2.0 * ROUNDED * size + SMALLEST
     return np.inf if np.isnan(bound) else bound
 
 
 @inner
-def _line(lines, row):
-    return lines[row, 0], lines[row, 1], lines[row, 2]
-
-
-@inner
-def _keep(lines, row, line):
-    for i in range(3):
-        lines[row, i] = line[i]
-
-
-@inner
-def _dot(lines, one, other):
-    x = _times(_line(lines, one), _line(lines, other))
-    y = _times(_line(lines, one + 1), _line(lines, other + 1))
-    z = _times(_line(lines, one + 2), _line(lines, other + 2))
-    return _plus(_plus(x, y), z)
-
-
-@inner
-def _plus(one, other):
-    """Sum of two quantities that lie within a radius of a line each."""
-    size = abs(one[0]) + abs(one[1]) + abs(other[0]) + abs(other[1])
-    radius = one[2] + other[2] + ROUNDED * size
-    return one[0] + other[0], one[1] + other[1], radius * (1.0 + ROUNDED)
-
-
-@inner
-def _times(one, other):
-    """Product; the square of the variable is from 0 to 1: half of it joins the centre."""
-    one_size = abs(one[0]) + abs(one[1])
-    other_size = abs(other[0]) + abs(other[1])
-    bow = 0.5 * one[1] * other[1]
-    radius = (
-        abs(bow) + one_size * other[2] + other_size * one[2] + one[2] * other[2]
-        + ROUNDED * one_size * other_size
-    )  # fmt: skip
-    return (
-        one[0] * other[0] + bow,
-        one[0] * other[1] + one[1] * other[0],
-        radius * (1.0 + ROUNDED),
-    )
-
-
-@inner
-def _inverse(line):
-    """One over a positive quantity; of infinite radius if it may vanish.
-
-    1 / (c + d) = 1/c - d/c^2 + d^2 / (c^2 (c + d)), of which the last is positive.
-    """
-    off = (abs(line[1]) + line[2]) * (1.0 + ROUNDED)
-    least = line[0] * (1.0 - ROUNDED) - off
-    if not least > 0.0:
-        return 0.0, 0.0, np.inf
-    inverse = 1.0 / line[0]
-    rest = 0.5 * (off * inverse) * (off * inverse) / least
-    radius = rest + line[2] * inverse * inverse + ROUNDED * (inverse + rest)
-    return inverse + rest, -line[1] * inverse * inverse, radius * (1.0 + ROUNDED)
+def along(lines, way):
+    """F at one end of its lines, along its centre, times the size of that."""
+    total = 0.0
+    for d in range(3):
+        total += lines[d, 0] * (lines[d, 0] + way * lines[d, 1])
+    return total

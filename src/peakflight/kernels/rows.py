@@ -24,8 +24,8 @@ KIND_TERMS: tuple[tuple[int, ...], ...] = (
     (2,),
     (2, 3),
     (2, 3, 4),
-    (2, 3, 4),
-    (2, 3, 4),
+    (1, 2, 3, 4),
+    (1, 2, 3, 4),
 )
 """The derivatives that each kind depends on."""
 LEANING = frozenset((4, 5))
@@ -48,13 +48,13 @@ WEIGHTLESS = 1e-8
 
 @inner
 def constrain(
-    kind, leaning, turning, reach, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes, bends
 ):
     """Values, slopes and bends of a kind at the samples of a piece; returns the stretch they need.
 
     samples (3, 4, S): axes, derivatives, samples; limits, values (S,); slopes (P, 3, S) and
     bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; leaning,
-    turning, reach (1,) of the airframe: None if no kind of theirs is limited.
+    turning, figures (3,) of `kernels.rotors`: None if no kind of theirs is limited.
     """
     slope = slopes[first]
     bend = bends[first]
@@ -66,7 +66,7 @@ def constrain(
         return _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend)
     if kind < ROTORS:
         return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
-    return _rotors(reach, kind, samples, count, limits, gravity, values, first, slopes, bends)
+    return _rotors(figures, kind, samples, count, limits, gravity, values, first, slopes, bends)
 
 
 @inner
@@ -90,7 +90,7 @@ def _turn(turning, kind, samples, count, limits, gravity, values, first, slopes,
 
 
 @inner
-def kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out):
+def kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out):
     """Out (S,) <- peak over limit of each sample (Eq. kapp_i, Eq. kappa2)."""
     if kind < 4:
         _norm_kappa(samples, kind, count, limit, out)
@@ -99,7 +99,7 @@ def kappa(kind, leaning, turning, reach, samples, count, limit, gravity, out):
     elif kind < ROTORS:
         _turn_kappa(turning, kind, samples, count, limit, gravity, out)
     else:
-        _rotors_kappa(reach, kind, samples, count, limit, gravity, out)
+        _rotors_kappa(figures, kind, samples, count, limit, gravity, out)
 
 
 @inner
@@ -366,52 +366,92 @@ def _angular_acceleration_kappa(samples, count, limit, gravity, out):
 
 
 @inner
-def _rotors(reach, kind, samples, count, limits, gravity, values, first, slopes, bends):
+def _rotors(figures, kind, samples, count, limits, gravity, values, first, slopes, bends):
     """Rotor thrusts; not compiled where they are not limited."""
-    if reach is None:
+    if figures is None:
         return 0.0
     sign = 1.0 if kind == ROTORS else -1.0
-    return _demand(sign, reach[0], samples, count, limits, gravity, values, first, slopes, bends)
+    return _demand(sign, figures, samples, count, limits, gravity, values, first, slopes, bends)
 
 
 @vector
-def _demand(sign, reach, samples, count, limits, gravity, values, first, slopes, bends):
-    """(|F| + c |alpha|) / L - 1 for the most, (g - |F| + c |alpha| - L) / g for the least thrust.
+def _with_drag(samples, count, drag, gravity):
+    """(3, 4, S) velocity, F with drag, and its two derivatives; samples hold F without."""
+    out = np.empty_like(samples)
+    for x in range(3):
+        weight = gravity if x == 2 else 0.0
+        for q in range(count):
+            out[x, 0, q] = samples[x, 0, q]
+            out[x, 1, q] = samples[x, 1, q] + drag * samples[x, 0, q]
+            out[x, 2, q] = samples[x, 2, q] + drag * (samples[x, 1, q] - weight)
+            out[x, 3, q] = samples[x, 3, q] + drag * samples[x, 2, q]
+    return out
 
-    c is the reach of the airframe; c |alpha| is rounded by ROUNDNESS, to the safe side. The stretch
-    x^-2 is that at which +-(|F| - g) x + c |alpha| x^2 would meet the limit.
+
+@inner
+def _pulled(samples, q):
+    """F.v of a sample."""
+    total = 0.0
+    for x in range(3):
+        total += samples[x, 1, q] * samples[x, 0, q]
+    return total
+
+
+@vector
+def _demand(sign, figures, samples, count, limits, gravity, values, first, slopes, bends):
+    """(T + c |alpha|) / L - 1 for the most, (g - T + c |alpha| - L) / g for the least thrust.
+
+    T = |F| + epsilon b.v, and c |alpha| is rounded by ROUNDNESS, to the safe side; all as in
+    `kernels.rotors`. The stretch x^-2 is that at which +-(T - g) x + c |alpha| x^2 would meet the
+    limit. What is found by F with drag and its derivatives is carried over to those of position.
     """
+    reach, drag, along_drag = figures[0], figures[1], figures[2]
+    carried = _with_drag(samples, count, drag, gravity)
     worst = 0.0
     for q in range(count):
-        square, turn, pull = _turn_of(samples, q, gravity)
-        thrust = np.sqrt(square)
-        size = _swing(samples, q, turn, pull)
+        square, turn, pull = _turn_of(carried, q, gravity)
+        norm = np.sqrt(square)
+        moved = _pulled(carried, q) / square
+        size = _swing(carried, q, turn, pull)
         swing = np.sqrt(reach * reach * size / square + (ROUNDNESS * gravity) ** 2)
         room = limits[q] - gravity if sign > 0.0 else limits[q]
-        over = sign * (thrust - gravity)
+        over = sign * (norm * (1.0 + along_drag * moved) - gravity)
         worst = max(worst, (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room))
         unit = 1.0 / limits[q] if sign > 0.0 else 1.0 / gravity
         values[q] = unit * (over + swing - room)
         bend = unit * reach * reach / (swing * square)
-        _swing_slopes(samples, q, square, turn, pull, bend, first, slopes, bends)
+        _swing_slopes(carried, q, square, turn, pull, bend, first + 1, slopes, bends)
+        push = sign * unit / norm
         for x in range(3):
-            slopes[first, x, q] += sign * unit / thrust * samples[x, 1, q]
-        bends[first, q] += max(sign, 0.0) * unit / thrust
+            thrust = carried[x, 1, q]
+            velocity = carried[x, 0, q]
+            own = thrust + along_drag * (velocity - moved * thrust)
+            slopes[first + 1, x, q] += push * own
+            slopes[first, x, q] = push * along_drag * thrust + drag * slopes[first + 1, x, q]
+            for term in range(1, 3):
+                slopes[first + term, x, q] += drag * slopes[first + term + 1, x, q]
+        bends[first + 1, q] += max(push, 0.0)
+        bends[first, q] = drag * drag * bends[first + 1, q]
+        for term in range(1, 3):
+            bends[first + term, q] += drag * drag * bends[first + term + 1, q]
     return np.sqrt(worst)
 
 
 @inner
-def _rotors_kappa(reach, kind, samples, count, limit, gravity, out):
-    if reach is None:
+def _rotors_kappa(figures, kind, samples, count, limit, gravity, out):
+    if figures is None:
         return
     sign = 1.0 if kind == ROTORS else -1.0
-    _demand_kappa(sign, reach[0], samples, count, limit, gravity, out)
+    _demand_kappa(sign, figures, samples, count, limit, gravity, out)
 
 
 @vector
-def _demand_kappa(sign, reach, samples, count, limit, gravity, out):
+def _demand_kappa(sign, figures, samples, count, limit, gravity, out):
+    carried = _with_drag(samples, count, figures[1], gravity)
     rest = gravity if sign < 0.0 else 0.0
     for q in range(count):
-        square, turn, pull = _turn_of(samples, q, gravity)
-        swing = reach * np.sqrt(_swing(samples, q, turn, pull) / square)
-        out[q] = (rest + sign * np.sqrt(square) + swing) / limit
+        square, turn, pull = _turn_of(carried, q, gravity)
+        norm = np.sqrt(square)
+        thrust = norm + figures[2] * _pulled(carried, q) / norm
+        swing = figures[0] * np.sqrt(_swing(carried, q, turn, pull) / square)
+        out[q] = (rest + sign * thrust + swing) / limit

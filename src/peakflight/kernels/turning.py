@@ -91,10 +91,14 @@ def binomials(degree: int) -> np.ndarray:
     return np.array([[float(comb(m, i)) for i in range(8 * n + 1)] for m in (n, 4 * n, 8 * n)])
 
 
-def workspace(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scratch arrays: intervals that wait; products on one of them; a motion at a point."""
+def workspace(degree: int) -> tuple[np.ndarray, ...]:
+    """Scratch arrays: intervals that wait; products on one of them; a motion at a point.
+
+    And figures for `required_stretch`, of a vehicle that has none.
+    """
     n = max(degree - 2, 0)
-    return np.empty((DEPTH + 3, n + 1, 9)), np.empty((ROWS, 8 * n + 1)), np.empty((3, 3))
+    stack = np.empty((DEPTH + 3, n + 1, 9))
+    return stack, np.empty((ROWS, 8 * n + 1)), np.empty((4, 3)), np.zeros(3)
 
 
 @inner
@@ -104,7 +108,7 @@ def largest_turn(order, coefficients, piece, time, gravity, tables, tolerance, p
     tables: as in `bounds`; points (n+1, 3), turns (`workspace`) and ends (depth, 3) are scratch.
     Returns an attained value (but for rounding), an upper bound, and where.
     """
-    stack, work, _ = turns
+    stack, work, _, _ = turns
     degree = stack.shape[1] - 1
     errors, unit = _vectors(
         order, coefficients, piece, time, degree, gravity, tables, points, stack
@@ -325,17 +329,17 @@ def split(stack, row, degree, at):
 
 @inner
 def required_stretch(
-    order, sign, reach, coefficients, piece, time, place, limit, gravity, factorials, motion
+    order, sign, figures, coefficients, piece, time, place, limit, gravity, factorials, motion
 ):
     """Uniform stretch from which on a point keeps a limit; 0 if it always does.
 
-    order, sign, reach: what is limited, see `_excess`; motion (3, 3) is scratch. Searched for from
-    where the point is, with steps towards the border that a power law would not overstep, then
+    order, sign, figures: what is limited, see `_excess`; motion (4, 3) is scratch. Searched for
+    from where the point is, with steps towards the border that a power law would not overstep, then
     closed by false position.
     """
     motion_at(order, coefficients, piece, place * time, factorials, motion)
     low = 0.0
-    value = _excess(order, sign, reach, motion, low, limit, gravity)
+    value = _excess(order, sign, figures, motion, low, limit, gravity)
     if value <= -700.0:
         return 0.0
     sense = 1.0 if value > 0.0 else -1.0
@@ -346,13 +350,13 @@ def required_stretch(
         low = high
         value = other
         high = low + sense * min(max(NEAREST, abs(value) / 8.0), FURTHEST)
-        other = _excess(order, sign, reach, motion, high, limit, gravity)
+        other = _excess(order, sign, figures, motion, high, limit, gravity)
         steps += 1
         if steps > STEPS:
             return np.exp(high)
     for _ in range(STEPS):
         middle = (low * other - high * value) / (other - value)
-        found = _excess(order, sign, reach, motion, middle, limit, gravity)
+        found = _excess(order, sign, figures, motion, middle, limit, gravity)
         if found * other <= 0.0:
             low = high
             value = other
@@ -367,36 +371,38 @@ def required_stretch(
 
 @inner
 def motion_at(order, coefficients, piece, time, factorials, motion):
-    """Motion (3, 3) <- acceleration to the derivative `order` of a piece, at a time."""
-    for s in range(2, order + 1):
+    """Motion (4, 3) <- velocity to the derivative `order` of a piece, at a time."""
+    for s in range(1, order + 1):
         for d in range(3):
             value = 0.0
             for j in range(coefficients.shape[1] - 1, s - 1, -1):
                 value = value * time + factorials[s, j] * coefficients[piece, j, d]
-            motion[s - 2, d] = value
+            motion[s - 1, d] = value
 
 
 @inner
-def _excess(order, sign, reach, motion, log_stretch, limit, gravity):
+def _excess(order, sign, figures, motion, log_stretch, limit, gravity):
     """Logarithm of value over limit of a point, stretched; between -700 and 50.
 
     The value is how fast the thrust direction turns (order 3) or how fast that changes (4) if sign
-    is 0, else what `rotors` is about.
+    is 0, else what `rotors` is about; figures are those of `rotors`, of which drag counts anyway.
     """
     power = np.exp(-log_stretch)
     square = power * power
-    x = motion[0, 0] * square
-    y = motion[0, 1] * square
-    z = motion[0, 2] * square + gravity
+    drag = figures[1]
+    x = motion[1, 0] * square + drag * motion[0, 0] * power
+    y = motion[1, 1] * square + drag * motion[0, 1] * power
+    z = motion[1, 2] * square + drag * motion[0, 2] * power + gravity
     length = x * x + y * y + z * z
-    u = motion[1, 0] * (square * power)
-    v = motion[1, 1] * (square * power)
-    w = motion[1, 2] * (square * power)
+    u = motion[2, 0] * (square * power) + drag * motion[1, 0] * square
+    v = motion[2, 1] * (square * power) + drag * motion[1, 1] * square
+    w = motion[2, 2] * (square * power) + drag * motion[1, 2] * square
     if order == 4:
         along = 2.0 * (x * u + y * v + z * w) / length
-        u = motion[2, 0] * (square * square) - along * u
-        v = motion[2, 1] * (square * square) - along * v
-        w = motion[2, 2] * (square * square) - along * w
+        drag *= square * power
+        u = motion[3, 0] * (square * square) + drag * motion[2, 0] - along * u
+        v = motion[3, 1] * (square * square) + drag * motion[2, 1] - along * v
+        w = motion[3, 2] * (square * square) + drag * motion[2, 2] - along * w
     e = y * w - z * v
     f = z * u - x * w
     h = x * v - y * u
@@ -404,7 +410,10 @@ def _excess(order, sign, reach, motion, log_stretch, limit, gravity):
     value = turn / length
     if sign != 0.0:
         rest = gravity if sign < 0.0 else 0.0
-        value = rest + sign * np.sqrt(length) + reach * value
+        thrust = np.sqrt(length)
+        pull = x * motion[0, 0] + y * motion[0, 1] + z * motion[0, 2]
+        thrust += figures[2] * power * pull / thrust
+        value = rest + sign * thrust + figures[0] * value
     if np.isnan(value):
         return 50.0
     return max(min(np.log(value / limit), 50.0), -700.0) if value > 0.0 else -700.0

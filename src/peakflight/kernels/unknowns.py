@@ -158,11 +158,11 @@ def make_limited(
     effort: np.ndarray | None,
     gravity: float,
     least: float = 0.0,
-    reach: np.ndarray | None = None,
+    figures: np.ndarray | None = None,
 ) -> Limited:
     """What is limited, from `Limits.as_array` and weights (4,) of integrals of squares, or None.
 
-    least: smallest stretch of interest, reach: of `Limits`, see `Limited`.
+    least: smallest stretch of interest, figures: of `Limits`, see `Limited`.
     """
     kinds = np.flatnonzero(np.isfinite(limits))
     terms = [KIND_TERMS[kind] for kind in kinds]
@@ -173,7 +173,7 @@ def make_limited(
         orders=np.array([order - 1 for term in terms for order in term]),
         leaning=np.ones(1) if LEANING.intersection(kinds) else None,
         turning=np.ones(1) if TURNING.intersection(kinds) else None,
-        reach=reach,
+        figures=figures,
         several=np.ones(1) if any(len(term) > 1 for term in terms) else None,
         effort=effort,
         gravity=np.array([gravity]),

@@ -95,7 +95,7 @@ def limit_kernels(problem: Problem) -> str:
     """Which kernels look at the limits of a problem: those not set are left out of them."""
     leaning = "-leaning" if problem.limits.on_leaning else ""
     turning = "-turning" if problem.limits.on_turning else ""
-    return leaning + turning + ("-rotors" if problem.limits.reach is not None else "")
+    return leaning + turning + ("-rotors" if problem.limits.figures is not None else "")
 
 
 def find(name: str) -> Method:

@@ -294,7 +294,7 @@ def _run(
     limits = problem.limits.as_array() if limits is None else limits
     free = problem.is_at_rest and task.effort is None
     limited = unknowns.make_limited(
-        limits, task.effort, GRAVITY, 0.0 if free else 1.0, problem.limits.reach
+        limits, task.effort, GRAVITY, 0.0 if free else 1.0, problem.limits.figures
     )
     work = unknowns.make_work(layout, grid, limited)
     unknowns.set_unknowns(layout, start.data, start.starts, start.times, work.x)
@@ -345,7 +345,7 @@ def _eases(problem: Problem) -> bool:
 
     It is not with motion that is fixed, nor for rotors: a stretch turns F.
     """
-    return problem.is_at_rest and problem.limits.reach is None
+    return problem.is_at_rest and problem.limits.figures is None
 
 
 def _is_sound(layout: Layout, x: np.ndarray) -> bool:

@@ -94,7 +94,7 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         tuple(basis.sample_tables(degree, samples) for samples, _, _ in settings.ladder),
         basis.sample_tables(degree, barrier.BATCH),
         _stages(settings.ladder, settings.stage_iterations), settings.memory,
-        barrier.workspace(count, degree, problem.limits.on_turning, problem.limits.reach),
+        barrier.workspace(count, degree, problem.limits.on_turning, problem.limits.figures),
         history,
     )  # fmt: skip
     status = Status.SOLVED if converged else Status.ITERATION_LIMIT

@@ -1,0 +1,256 @@
+"""Certified upper bounds of how a vehicle twists about its thrust, and what its rotors give then.
+
+Flight and yaw together say how the vehicle turns. With F, its derivatives j and s, its direction b
+and epsilon as in `kernels.rotors`, and
+
+    w = F x j / F.F,    w' = F x (s - 2 (F.j / F.F) j) / F.F,    b' = w x b,
+
+the body, tilted to b by the shortest way after a turn by the yaw psi, has about its own z axis
+
+    omega_z = psi' - w_3 / (1 + b_3),
+    alpha_z = psi'' - w'_3 / (1 + b_3) + w_3 b'_3 / (1 + b_3)^2,
+
+and across it the torque I w' + I_z omega_z b', where I is its inertia across z and I_z that about
+it. Whatever the direction of the nose, four rotors in a square of lever l whose torque is kappa
+times their thrust then give, times four and over the mass m, at most
+
+    |F| + epsilon b.v + c |w' + r omega_z b'| + k |alpha_z|,
+
+with c = sqrt(2) I / (l m), r = I_z / I and k = I_z / (kappa m), and at least the same with the
+other signs of what turns it. If inertia differs by D between the two axes across z, and I is the
+larger, that adds at most (1 + r) D / I c |omega_z| |w| and D / (kappa m) |w|^2 / 2.
+
+On intervals all of it lies within radii of lines (`kernels.lines`); bounds and subdivision are as
+in `kernels.rotors`.
+"""
+
+import numpy as np
+
+from peakflight.kernels.bernstein import EPSILON, control_points
+from peakflight.kernels.jit import inner, kernel
+from peakflight.kernels.lines import (
+    ROUNDED,
+    cross,
+    dot,
+    drawn,
+    end_norm,
+    inverse,
+    keep,
+    line,
+    negative,
+    plus,
+    thickness,
+    times,
+)
+from peakflight.kernels.rotors import (
+    AXIS,
+    JERK,
+    LINES,
+    PULL,
+    SMALLEST,
+    TURN,
+    F,
+    along,
+    control_columns,
+    draw,
+)
+from peakflight.kernels.turning import DEPTH, NESTING, split
+
+COUNT = 4
+"""What is bounded: |omega_z|, |alpha_z|, and what the most and the least of a rotor's thrusts ask,
+in the form of `kernels.rotors`."""
+SPLITS = 2000
+"""Subdivisions of one part of a piece; beyond, the bound of an interval is taken as it is."""
+RATE, SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 9, LINES + 11
+"""Rows of lines after those of `rotors`, of which TURN is w': w, b', w' + r omega_z b', then
+omega_z and alpha_z."""
+
+
+@kernel
+def largest(
+    coefficients, durations, yaw, parts, lost, firsts, figures, limits, gravity, tables, tolerance,
+    upper,
+):  # fmt: skip
+    """Upper bounds of what is limited over every piece of a flight, over the limits.
+
+    Parameters
+    ----------
+    coefficients, durations
+        (K, N+1, 3) and (K,) s of the flight.
+    yaw, parts, lost, firsts
+        (M, n+1, 3) with the yaw in the first axis, (M,) s, (M, 2) what its rate and acceleration
+        are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
+        (K+1,) `firsts` on.
+    figures
+        (7,) c, delta, epsilon, r, k, and the factors of |omega_z| |w| and of |w|^2.
+    limits
+        (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
+        least thrust may fall, as in `Limits.as_array`.
+    tables
+        Of `bernstein_tables` and `falling_factorials` of the larger degree of both.
+    tolerance
+        To which bounds are closed, relative to the limit or the value, if that is larger.
+    upper
+        (K, COUNT) gets the bounds; NaN where nothing is limited.
+    """
+    degree = max(coefficients.shape[1] - 2, yaw.shape[1] - 2, 0)
+    whole = np.empty((2, degree + 1, 12))
+    stack = np.empty((DEPTH + 3, degree + 1, 14))
+    points = np.empty((degree + 1, 3))
+    lines = np.empty((ROWS, 3))
+    state = np.empty((DEPTH + 3, 2))
+    turned = np.empty((2, 2))
+    bounds = np.empty((3, COUNT))
+    errors = np.zeros(4)
+    sizes = np.zeros(4)
+    for k in range(durations.size):
+        bounds[:] = 0.0
+        if not control_columns(
+            coefficients, k, durations[k], figures[1], gravity, tables[0], tables[1], points, whole,
+            errors, sizes,
+        ):  # fmt: skip
+            errors[:] = np.inf
+        rest = durations[k]
+        for part in range(firsts[k], firsts[k + 1]):
+            row = 0
+            if part + 1 < firsts[k + 1]:
+                split(whole, 0, degree, parts[part] / rest)
+                rest -= parts[part]
+                row = 1
+            for i in range(degree + 1):
+                for c in range(12):
+                    stack[0, i, c] = whole[row, i, c]
+            state[0, 0] = float(part - firsts[k] + 1)
+            state[0, 1] = 0.0
+            for order in range(2):
+                turned[order] = control_points(
+                    yaw, part, parts[part], order + 1, degree, 0.0, tables[0], tables[1], points
+                )
+                turned[order, 0] += lost[part, order]
+                for i in range(degree + 1):
+                    stack[0, i, 12 + order] = points[i, 0]
+            _close(
+                stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance,
+                lines, bounds,
+            )  # fmt: skip
+        for q in range(COUNT):
+            upper[k, q] = np.nan
+            if limits[q] > 0.0:
+                upper[k, q] = max(bounds[0, q], bounds[1, q]) / limits[q] * (1.0 + 4.0 * EPSILON)
+
+
+@inner
+def _close(
+    stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance, lines, bounds
+):
+    """Raise bounds (3, COUNT), from below, from above and of an interval, by a part of a piece.
+
+    In row 0 of the stack are its control points; state: how often each interval was subdivided, in
+    all and within the part; turned (2, 2): error and size of the yaw's rate and acceleration.
+    """
+    waiting = 1
+    splits = 0
+    while waiting > 0:
+        waiting -= 1
+        nesting = state[waiting, 0]
+        depth = state[waiting, 1]
+        bounds[2] = np.inf
+        if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures, lines):
+            _measure(lines, figures, gravity, bounds)
+        is_closed = True
+        for q in range(COUNT):
+            if limits[q] > 0.0:
+                low = bounds[0, q]
+                if not bounds[2, q] <= low + tolerance * max(low, limits[q]):
+                    is_closed = False
+        if is_closed or waiting >= DEPTH or splits >= SPLITS or depth >= NESTING:
+            for q in range(COUNT):
+                bounds[1, q] = max(bounds[1, q], bounds[2, q])
+            continue
+        split(stack, waiting, degree, 0.5)
+        for side in range(2):
+            state[waiting + side, 0] = nesting + 1.0
+            state[waiting + side, 1] = depth + 1.0
+        splits += 1
+        waiting += 2
+
+
+@inner
+def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
+    """Lines <- all of the quantities at the top on an interval.
+
+    Returns whether they are defined: there is thrust all along, and it does not point straight
+    down.
+    """
+    if not draw(stack, row, degree, errors, sizes, nesting, figures[2], lines):
+        return False
+    square = inverse(dot(lines, F, F))
+    cross(lines, F, JERK, RATE)
+    for d in range(3):
+        keep(lines, RATE + d, times(line(lines, RATE + d), square))
+    cross(lines, RATE, AXIS, SWING)
+    height = line(lines, AXIS + 2)
+    rise = inverse((1.0 + height[0], height[1], height[2] + ROUNDED))
+    if not rise[2] < np.inf:
+        return False
+    for order in range(2):
+        lost = turned[order, 0] + (degree * nesting + 16.0) * EPSILON * turned[order, 1]
+        keep(lines, TWIST + order, drawn(stack, row, 12 + order, degree, lost))
+    tilting = times(line(lines, RATE + 2), rise)
+    twist = plus(line(lines, TWIST), negative(tilting))
+    change = plus(line(lines, TWIST + 1), negative(times(line(lines, TURN + 2), rise)))
+    change = plus(change, times(times(tilting, rise), line(lines, SWING + 2)))
+    keep(lines, TWIST, twist)
+    keep(lines, TWIST + 1, change)
+    ratio = figures[3]
+    pull = (ratio * twist[0], ratio * twist[1], ratio * twist[2])
+    for d in range(3):
+        swung = times(pull, line(lines, SWING + d))
+        keep(lines, TORQUE + d, plus(line(lines, TURN + d), swung))
+    return True
+
+
+@inner
+def _measure(lines, figures, gravity, bounds):
+    """Bounds of what is limited on an interval: above, and below its maximum.
+
+    At an end of the interval it is within the radii of what it is at the ends of the lines.
+    """
+    bounds[2] = 0.0
+    reach, spin = figures[0], figures[4]
+    centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
+    wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
+    wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
+    size = gravity
+    # both of a product lie below their chords, and that of these exceeds its ends by at most this
+    spread = abs(end_norm(lines, RATE, 1.0) - end_norm(lines, RATE, -1.0))
+    chords = 0.5 * figures[5] * spread * abs(lines[TWIST, 1])
+    for side in range(2):
+        way = 2.0 * side - 1.0
+        for order in range(2):
+            end = abs(lines[TWIST + order, 0] + way * lines[TWIST + order, 1])
+            radius = lines[TWIST + order, 2] + ROUNDED * end
+            bounds[0, order] = max(bounds[0, order], end - radius)
+            bounds[2, order] = max(bounds[2, order], (end + radius) * (1.0 + ROUNDED))
+            change = end
+        thrust = end_norm(lines, F, way)
+        turning = reach * end_norm(lines, TORQUE, way) + spin * change
+        pull = lines[PULL, 0] + way * lines[PULL, 1]
+        size = max(size, gravity + thrust + abs(pull) + turning)
+        rest = gravity - pull + turning
+        rate = end_norm(lines, RATE, way)
+        spun = abs(lines[TWIST, 0] + way * lines[TWIST, 1])
+        slow = max(rate - thickness(lines, RATE), 0.0)
+        lower = (figures[5] * max(spun - lines[TWIST, 2], 0.0) + figures[6] * slow) * slow - wide
+        fast = rate + thickness(lines, RATE)
+        upper = (figures[5] * (spun + lines[TWIST, 2]) + figures[6] * fast) * fast
+        upper = (upper + chords + wide) * (1.0 + ROUNDED)
+        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + lower)
+        bounds[0, 3] = max(bounds[0, 3], rest - thrust + lower)
+        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + upper)
+        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + upper)
+    for q in range(2, COUNT):
+        bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
+    for q in range(COUNT):
+        if np.isnan(bounds[2, q]):
+            bounds[2, q] = np.inf

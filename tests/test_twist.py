@@ -1,0 +1,298 @@
+"""Turning about the thrust: the free nose, limits about the body, and rotors with a yaw."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import peakflight as pf
+from peakflight.errors import InvalidProblem
+from peakflight.kernels import lines, twisting
+from peakflight.kernels.jit import kernel
+from peakflight.limits import GRAVITY, KINDS, ROTORS
+from peakflight.trajectory import Trajectory
+from peakflight.twist import turning_about_z, untwisted
+from peakflight.twist_certificate import TOLERANCE, certify_twist
+from peakflight.vehicle import Vehicle
+from peakflight.yaw import BODY_KINDS
+
+COURSES = Path(__file__).parent.parent / "examples" / "courses"
+RACER = pf.find_vehicle("racing-quad").on_rotors()
+ODD = Vehicle(
+    name="odd",
+    mass=0.5,
+    inertia=(2.0e-3, 2.3e-3, 3.5e-3),
+    rotor_positions=((0.1, -0.1), (-0.1, -0.1), (-0.1, 0.1), (0.1, 0.1)),
+    spins=(-1, 1, -1, 1),
+    rotor_thrust=(0.05, 4.0),
+    torque_per_thrust=0.02,
+    motor_lag=0.02,
+    drag=(0.2, 0.35),
+    limits=pf.Limits(speed=8.0),
+).on_rotors()
+"""Everything that rotor limits count: drag along and across, and unequal inertia."""
+WAYPOINTS = np.array([[0, 0, 1], [3, 0.5, 1.6], [3.5, 3, 1.0], [0.5, 3.5, 2.0], [0, 1, 1]], float)
+
+
+def course(name):
+    return pf.read_course(COURSES / f"{name}.json").waypoints
+
+
+def seen(plan, rate=1e4):
+    """What an independent model of the vehicle does along a plan, sampled."""
+    count = int(plan.duration * rate)
+    times = np.linspace(plan.trajectory.start_time, plan.trajectory.end_time, count)
+    return pf.planned_states(plan, times)
+
+
+def assert_as_seen(plan):
+    """Feasible, and what is certified lies above what samples show, but not far."""
+    assert plan.report.feasible, plan.message
+    states, limits = seen(plan), plan.problem.limits
+    least, most = limits.least_rotor_thrust, limits.rotor_thrust
+    assert states.rotor_thrust.max() <= most * (1.0 + 1e-9)
+    assert states.rotor_thrust.min() >= least - 1e-9 * most
+    about_z = (states.body_rate[:, 2], states.angular_acceleration[:, 2])
+    for kind, values in zip(BODY_KINDS, about_z, strict=True):
+        limit = plan.problem.heading.limits.get(kind)
+        if limit is not None:
+            reached = np.abs(values).max() / limit
+            kappa = plan.report.peaks[kind.name].max()
+            # samples miss what lasts less than 0.1 ms, and both are rounded
+            assert reached * (1.0 - 1e-9) - 1e-9 <= kappa <= reached * 1.01 + 2.0 * TOLERANCE
+    again = pf.Plan.from_dict(json.loads(json.dumps(plan.to_dict())))
+    assert pf.certify_plan(again).to_dict() == plan.report.to_dict()
+
+
+# ---- arithmetic on lines ----------------------------------------------------------------------
+
+
+@kernel
+def one_over_root(line):
+    return lines.inverse_root((line[0], line[1], line[2]))
+
+
+@pytest.mark.kernels
+def test_inverse_root_holds_all_along_the_line():
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        centre, slope, radius = 10.0 ** rng.uniform(-3, 3), rng.normal(), 10.0 ** rng.uniform(-9, 0)
+        line = np.array([centre, 0.4 * slope * centre, 0.1 * radius * centre])
+        root = one_over_root(line)
+        if not root[2] < np.inf:
+            assert abs(line[1]) + line[2] >= 0.99 * centre
+            continue
+        at = np.linspace(-1.0, 1.0, 41)
+        for side in (-1.0, 1.0):
+            values = 1.0 / np.sqrt(line[0] + line[1] * at + side * line[2])
+            assert (np.abs(values - (root[0] + root[1] * at)) <= root[2] * (1.0 + 1e-12)).all()
+
+
+# ---- the free nose ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("vehicle", [RACER, ODD], ids=lambda vehicle: vehicle.name)
+def test_a_free_nose_does_not_turn_about_the_thrust(vehicle):
+    made = pf.plan(WAYPOINTS, vehicle=vehicle)
+    assert made.problem.heading.policy == "free"
+    rates = seen(made).body_rate
+    assert np.abs(rates[:, 2]).max() <= 1e-3 * np.abs(rates).max()
+    assert_as_seen(made)
+
+
+def test_the_free_yaw_is_better_on_finer_parts():
+    flight = pf.plan(WAYPOINTS, vehicle=RACER).trajectory
+    times = np.linspace(flight.start_time, flight.end_time, 5000)
+    worst = []
+    for parts in (10, 20, 40):
+        yaw = untwisted(flight, np.full(len(flight), parts), RACER.airframe)
+        worst.append(np.abs(turning_about_z(flight, yaw, times, RACER.airframe)[0]).max())
+    # the fifth power of the parts, at least the third over joints and short pieces
+    assert worst[1] <= worst[0] / 8.0
+    assert worst[2] <= worst[1] / 8.0
+
+
+def test_straight_up_the_nose_stays():
+    made = pf.plan([[0, 0, 0], [0, 0, 2]], vehicle=RACER)
+    assert not made.yaw_motion.coefficients.any()
+    assert made.report.feasible
+
+
+# ---- limits about the body --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("vehicle", [RACER, ODD], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize(
+    "yaw",
+    [
+        "velocity",
+        {"point": [1.5, 1.5, 0.0]},
+        {"angles": [0.0, 1.0, 2.0, 3.0, 3.0]},
+        {"policy": "velocity", "rate": 0.5, "acceleration": None},
+        {"policy": "free", "rate": 1.0},
+        {"policy": "fixed", "angle": 0.5, "rate": None, "acceleration": None},
+    ],
+    ids=str,
+)
+def test_rotors_keep_their_range_with_any_yaw(vehicle, yaw):
+    assert_as_seen(pf.plan(WAYPOINTS, vehicle=vehicle, yaw=yaw))
+
+
+def test_a_yaw_policy_costs_the_racer_little():
+    free = pf.plan(course("uzh_19wp"), vehicle=RACER)
+    yawed = pf.plan(course("uzh_19wp"), vehicle=RACER, yaw={"policy": "velocity", "rate": 3.0})
+    assert_as_seen(free)
+    assert_as_seen(yawed)
+    assert free.duration <= 18.36
+    assert yawed.duration <= 1.02 * free.duration
+
+
+def test_limits_about_the_body_without_limits_on_rotors():
+    limits = pf.Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
+    heading = pf.Heading(policy="velocity", rate=1.0, acceleration=5.0, about="body")
+    made = pf.plan(WAYPOINTS, limits=limits, yaw=heading)
+    assert made.report.feasible, made.message
+    times = np.linspace(0.0, made.duration, 20_000)
+    rate, acceleration = turning_about_z(made.trajectory, made.yaw_motion, times, None)
+    assert np.abs(rate).max() <= 1.0
+    assert np.abs(acceleration).max() <= 5.0
+    assert set(made.report.peaks) >= {"body_rate_z", "angular_acceleration_z"}
+
+
+def test_a_moving_start_is_planned_again_with_room_for_the_yaw():
+    made = pf.plan(WAYPOINTS, vehicle=RACER, yaw="velocity", start={"velocity": [1.0, 0.0, 0.0]})
+    assert_as_seen(made)
+
+
+# ---- what is proven ---------------------------------------------------------------------------
+
+
+def random_flight(rng, pieces=3):
+    """Pieces of degree 7 and a yaw of degree 5 with knots of its own."""
+    sizes = np.array([1.0, 4.0, 4.0, 6.0, 10.0, 10.0, 8.0, 4.0])[:, None]
+    flight = Trajectory(rng.normal(size=(pieces, 8, 3)) * sizes, rng.uniform(0.2, 0.9, pieces))
+    ends = np.sort(rng.uniform(0.0, flight.duration, 4))
+    times = np.diff(np.concatenate(([0.0], ends, [flight.duration])))
+    return flight, Trajectory(rng.normal(size=(5, 6, 1)) * 3.0, times)
+
+
+@pytest.mark.parametrize("vehicle", [RACER, ODD], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize("seed", range(10))
+def test_bounds_lie_above_an_independent_model_and_close(vehicle, seed):
+    flight, yaw = random_flight(np.random.default_rng(seed))
+    heading = pf.Heading(policy="velocity", rate=3.0, acceleration=20.0, about="body")
+    problem = pf.Problem(WAYPOINTS, vehicle=vehicle, yaw=heading)
+    peaks, _ = certify_twist(problem, heading, yaw, flight)
+    for k, (begin, duration) in enumerate(
+        zip(flight.breakpoints[:-1], flight.segment_times, strict=True)
+    ):
+        times = begin + duration * np.linspace(1e-9, 1.0 - 1e-9, 20_001)
+        turn = [yaw(times, order)[:, 0] for order in range(3)]
+        states = pf.states_along(flight, times, vehicle, yaw=turn)
+        if not np.isfinite(peaks["rotor_thrust"][k]) or states.thrust_acceleration.min() < 0.5:
+            continue
+        for kind, values, limit in (
+            ("body_rate_z", states.body_rate[:, 2], 3.0),
+            ("angular_acceleration_z", states.angular_acceleration[:, 2], 20.0),
+        ):
+            reached = np.abs(values).max() / limit
+            assert reached * (1.0 - 1e-9) <= peaks[kind][k] <= reached * (1.0 + 1e-3) + 1e-5
+        sampled = problem.limits.ratios(
+            {
+                **dict.fromkeys((kind.name for kind in KINDS), np.ones(1)),
+                "rotor_thrust": states.rotor_thrust.max(),
+                "least_rotor_thrust": states.rotor_thrust.min(),
+            }
+        )
+        for name in ROTORS:
+            assert peaks[name][k] >= sampled[name] * (1.0 - 1e-12)
+
+
+def test_the_bound_is_what_the_formula_gives_at_the_worst_heading():
+    """Rotors of an even vehicle in hover that spins faster and faster: by hand."""
+    spin = 4.0
+    hover = Trajectory(np.ones((1, 1, 3)), [1.0])
+    yaw = Trajectory(np.array([[[0.0], [0.0], [0.5 * spin]]]), [1.0])
+    heading = pf.Heading(policy="free", rate=5.0, acceleration=5.0)
+    problem = pf.Problem(WAYPOINTS, vehicle=RACER, yaw=heading)
+    peaks, _ = certify_twist(problem, heading, yaw, hover)
+    assert peaks["body_rate_z"] == pytest.approx(spin / 5.0, rel=1e-6)
+    assert peaks["angular_acceleration_z"] == pytest.approx(spin / 5.0, rel=1e-6)
+    share = RACER.mass * GRAVITY / 4.0
+    turning = RACER.inertia[2] * spin / (4.0 * RACER.torque_per_thrust)
+    assert peaks["rotor_thrust"] == pytest.approx((share + turning) / RACER.rotor_thrust[1])
+
+
+@pytest.mark.parametrize(
+    "break_it",
+    [
+        lambda yaw: None,
+        lambda yaw: yaw.shift(0.1),
+        lambda yaw: yaw.stretch(0.5),
+    ],
+)
+def test_a_yaw_that_does_not_fit_proves_nothing(break_it):
+    made = pf.plan(WAYPOINTS, vehicle=RACER)
+    report = pf.certify_plan(replace(made, yaw_motion=break_it(made.yaw_motion)))
+    assert not report.feasible
+    assert report.peaks["rotor_thrust"].min() > 1.0
+
+
+def test_a_yaw_that_twists_too_fast_is_said():
+    made = pf.plan(WAYPOINTS, vehicle=RACER, yaw={"policy": "free", "rate": 1.0})
+    times = made.yaw_motion.segment_times
+    spun = made.yaw_motion.coefficients.copy()
+    spun[:, 0, 0] += 2.0 * made.yaw_motion.breakpoints[:-1]
+    spun[:, 1] += 2.0
+    report = pf.certify_plan(replace(made, yaw_motion=Trajectory(spun, times)))
+    assert not report.feasible
+    assert any(line.startswith("body rate about z reaches 2") for line in report.problems)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"policy": "velocity", "about": "nose"}, "it must be yaw or body"),
+        ({"policy": "free", "about": "yaw"}, "a free nose is limited about the body"),
+        ({"policy": "free", "angle": 1.0}, "has no use for angle"),
+        ({"policy": "velocity", "about": "body", "rate": -1.0}, "limit body_rate_z is -1"),
+    ],
+)
+def test_headings_that_make_no_sense(fields, words):
+    with pytest.raises(InvalidProblem, match=words):
+        pf.Heading(**fields)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"yaw_inertia": 1e-3}, "give both"),
+        ({"drag": (0.1,)}, "two numbers"),
+        ({"drag": (0.1, -0.1)}, "both must be from 0"),
+        ({"drag": (0.1, math.nan)}, "both must be from 0"),
+        ({"inertia_difference": 2e-3}, "below the inertia"),
+    ],
+)
+def test_airframes_that_make_no_sense(fields, words):
+    with pytest.raises(InvalidProblem, match=words):
+        pf.Airframe(mass=0.85, inertia=1e-3, lever=0.1, **fields)
+
+
+def test_an_airframe_through_json():
+    limits = ODD.limits
+    assert pf.Limits.from_dict(json.loads(json.dumps(limits.to_dict()))) == limits
+
+
+@pytest.mark.kernels
+def test_an_inverted_vehicle_has_no_bound():
+    falling = Trajectory(np.array([[[0, 0, 0], [0, 0, 0], [0, 0, -12.0]]], float), [0.5])
+    yaw = Trajectory(np.zeros((1, 1, 1)), [0.5])
+    heading = pf.Heading(policy="free")
+    problem = pf.Problem(WAYPOINTS, vehicle=RACER, yaw=heading)
+    peaks, problems = certify_twist(problem, heading, yaw, falling)
+    assert peaks["body_rate_z"][0] > 1e6
+    assert problems
+    assert len(BODY_KINDS) + len(ROTORS) == twisting.COUNT
