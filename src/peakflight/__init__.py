@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from peakflight.airframe import Airframe
 from peakflight.course import Course, tidy
 from peakflight.errors import (
+    ExecutorFailed,
     InvalidFile,
     InvalidProblem,
     MissingExtra,
@@ -25,6 +26,7 @@ from peakflight.version import __version__
 from peakflight.yaw import Heading
 
 if TYPE_CHECKING:
+    from peakflight.batch import BatchResult, FlightResult, fly_many, plan_many
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
@@ -46,11 +48,14 @@ __all__ = [
     "KINDS",
     "VEHICLES",
     "Airframe",
+    "BatchResult",
     "Conditions",
     "Course",
     "Crash",
+    "ExecutorFailed",
     "FlatStates",
     "Flight",
+    "FlightResult",
     "FlySettings",
     "Heading",
     "History",
@@ -74,9 +79,11 @@ __all__ = [
     "find_vehicle",
     "flat_states",
     "fly",
+    "fly_many",
     "fly_spread",
     "minimum_effort_spline",
     "plan",
+    "plan_many",
     "planned_states",
     "read_course",
     "replan",
@@ -86,10 +93,12 @@ __all__ = [
 ]
 
 _LAZY = {
+    "BatchResult": "peakflight.batch",
     "Conditions": "peakflight.flight",
     "Crash": "peakflight.flight",
     "FlatStates": "peakflight.flatness",
     "Flight": "peakflight.flight",
+    "FlightResult": "peakflight.batch",
     "FlySettings": "peakflight.flight",
     "Spread": "peakflight.flight",
     "SpreadResult": "peakflight.flight",
@@ -98,9 +107,11 @@ _LAZY = {
     "discretised_bound": "peakflight.bound",
     "flat_states": "peakflight.flatness",
     "fly": "peakflight.flight",
+    "fly_many": "peakflight.batch",
     "fly_spread": "peakflight.flight",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
+    "plan_many": "peakflight.batch",
     "planned_states": "peakflight.flatness",
     "replan": "peakflight.planner",
     "states_along": "peakflight.flatness",

@@ -29,6 +29,7 @@ from peakflight.cli.fly import fly
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
+from peakflight.cli.plan_many import plan_many
 from peakflight.cli.vehicles import vehicles
 from peakflight.errors import PeakflightError
 
@@ -103,6 +104,7 @@ def application(context: click.Context) -> int:
 
 
 application.add_command(plan)
+application.add_command(plan_many)
 application.add_command(check)
 application.add_command(compare)
 application.add_command(fly)

@@ -1,0 +1,7 @@
+"""Many plans or flights at once, on processes of this machine or on a cluster."""
+
+from peakflight.batch.planning import BatchResult, plan_many
+from peakflight.batch.processes import Processes
+from peakflight.batch.run import Done, Failure, Work, run
+
+__all__ = ["BatchResult", "Done", "Failure", "Processes", "Work", "plan_many", "run"]
