@@ -83,6 +83,12 @@ def bits(plan: pf.Plan | None) -> dict[str, Any]:
     return {name: value for name, value in plan.to_dict().items() if name != "wall_time_s"}
 
 
+@pytest.fixture(scope="module")
+def plans() -> list[pf.Plan]:
+    slow = [replace(one, limits=pf.Limits(speed=1.0, jerk=20.0)) for one in problems(3)]
+    return [pf.plan(one, method="proportional") for one in slow]
+
+
 @contextmanager
 def dask() -> Iterator[Executor]:
     distributed = pytest.importorskip("distributed", reason="extra cluster is missing")
@@ -177,6 +183,62 @@ class TestPlans:
             pytest.raises(pf.InvalidProblem, match="workers given beside an executor"),
         ):
             pf.plan_many(problems(1), executor=executor, workers=2)
+
+
+class TestFlights:
+    OPTIONS: dict[str, Any] = {  # noqa: RUF012 (a constant)
+        "vehicle": "crazyflie-2.1",
+        "conditions": pf.Conditions(position_noise=1e-3, seed=5),
+        "settings": pf.FlySettings(ground=None),
+    }
+
+    @pytest.mark.parametrize("samples", [False, True])
+    def test_are_those_of_fly_to_the_last_bit(
+        self, plans: list[pf.Plan], samples: bool, tmp_path: Path
+    ) -> None:
+        options = {**self.OPTIONS, "samples": samples, "store": tmp_path / "s"}
+        found = list(pf.fly_many(plans, workers=2, **options))
+        again = list(pf.fly_many(plans, workers=1, **options))
+        assert sorted(one.index for one in found) == [0, 1, 2]
+        assert all(one.resumed for one in again)
+        for one in (*found, *again):
+            assert one.plan is plans[one.index]
+            flight = pf.fly(one.plan, **self.OPTIONS)
+            assert one.summary is not None
+            assert one.summary.rms_error == flight.rms_error
+            assert one.summary.top_error == flight.top_error
+            assert one.summary.saturation_share == flight.saturation_share
+            assert one.summary.crash == flight.crash
+            if samples:
+                assert one.flight is not None
+                assert one.flight.to_dict() == flight.to_dict()
+            else:
+                assert one.flight is None
+
+    def test_a_plan_that_no_vehicle_flies_is_a_failure(self, plans: list[pf.Plan]) -> None:
+        one = next(pf.fly_many(plans[:1], workers=1))
+        assert one.summary is None
+        assert one.failure is not None
+        assert one.failure.kind == "InvalidProblem"
+        assert "names no vehicle" in one.failure.text
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            ({"controller": "by hand"}, "unknown controller 'by hand'"),
+            ({"vehicle": "kite"}, "kite"),
+            ({"workers": 0}, "workers is 0"),
+        ],
+    )
+    def test_wrong_arguments_are_refused_at_once(
+        self, plans: list[pf.Plan], options: dict[str, Any], words: str
+    ) -> None:
+        with pytest.raises(pf.InvalidProblem, match=words):
+            pf.fly_many(plans, **options)
+
+    def test_what_is_not_a_plan_is_named(self, plans: list[pf.Plan]) -> None:
+        with pytest.raises(pf.InvalidProblem, match="plan 1 is of type Trajectory"):
+            pf.fly_many([plans[0], plans[0].trajectory])  # type: ignore[list-item]
 
 
 class TestRunning:
