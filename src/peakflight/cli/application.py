@@ -22,6 +22,7 @@ from typing import Any
 import click
 
 import peakflight
+from peakflight.cli.analyse import analyse
 from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
@@ -106,6 +107,7 @@ def application(context: click.Context) -> int:
 application.add_command(plan)
 application.add_command(plan_many)
 application.add_command(check)
+application.add_command(analyse)
 application.add_command(compare)
 application.add_command(fly)
 application.add_command(paper)
