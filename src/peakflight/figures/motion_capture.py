@@ -25,8 +25,9 @@ from peakflight.result import Plan
 if TYPE_CHECKING:
     from peakflight.flight.motion_capture import FlightAnalysis
 
-PLANNED: dict[str, Any] = {"color": "#e08a00", "linestyle": (0, (5, 1.5)), "linewidth": 1.3}
-FLOWN: dict[str, Any] = {"color": "#0a4a3a", "linestyle": "-", "linewidth": 1.1}
+PLANNED: dict[str, Any] = {"color": "#e08a00", "linestyle": (0, (5, 1.5)), "linewidth": 1.2}
+"""Drawn over what was flown, so that where they are one both are seen."""
+FLOWN: dict[str, Any] = {"color": "#0a4a3a", "linestyle": "-", "linewidth": 0.9}
 CENTIMETRES = 100.0
 """In a metre."""
 
@@ -50,12 +51,11 @@ def motion_capture_figures(
 
 def _path(analysis: "FlightAnalysis", plan: Plan, title: str) -> Figure:
     """Both paths from above and from the side."""
-    flown = analysis.positions
-    ends = np.stack((flown[:-1], flown[1:]), axis=1)
-    paths = [
-        FlownPath.of(plan.trajectory, PLANNED),
-        FlownPath(ends, np.zeros(len(ends)), FLOWN),
-    ]
+    middles = [0.5 * (begin + end) for begin, end in analysis.gaps]
+    parts = np.split(analysis.positions, np.searchsorted(analysis.times, middles))
+    lines = [np.stack((part[:-1], part[1:]), axis=1) for part in parts if len(part) > 1]
+    paths = [FlownPath(ends, np.zeros(len(ends)), FLOWN) for ends in lines]
+    paths.append(FlownPath.of(plan.trajectory, PLANNED))
     waypoints = plan.problem.waypoints
     height = paper_height(paths, waypoints)
     figure = new_figure(height + 0.6 + LEGEND_TOP + LEGEND_ROW)
@@ -74,7 +74,7 @@ def _derivatives(analysis: "FlightAnalysis", plan: Plan, title: str) -> Figure:
     for kind, axes in zip(kinds, panels, strict=True):
         curve = analysis.curves[kind.name]
         unit = np.degrees(1.0) if kind.unit == "rad" else 1.0
-        both = (unit * curve.planned, PLANNED), (unit * curve.flown, FLOWN)
+        both = (unit * curve.flown, FLOWN), (unit * curve.planned, PLANNED)
         for values, style in both:
             axes.plot(curve.times, values, zorder=3, **style)
         known = np.concatenate([values[np.isfinite(values)] for values, _ in both])
