@@ -94,7 +94,7 @@ def dask() -> Iterator[Executor]:
     distributed = pytest.importorskip("distributed", reason="extra cluster is missing")
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None
+            n_workers=2, threads_per_worker=1, dashboard_address=":0"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
