@@ -1,4 +1,4 @@
-"""Many plans and flights on all processors, with results kept in a file that can be gone on with."""
+"""Many plans and flights on all processors; results are kept in a file, to go on with."""
 
 import os
 from pathlib import Path
