@@ -204,6 +204,8 @@ class _Dispatch(Generic[Item, Value]):
         self._suspects: deque[int] = deque()
         """Items that were under way when a process died: done one by one, nothing beside them."""
         self._running: dict[Future[list[_Outcome]], list[int]] = {}
+        self._broken: BrokenExecutor | None = None
+        """Why the executor, which is not ours to mend, does no more."""
 
     def outcomes(self, todo: Sequence[int]) -> Iterator[list[tuple[int, _Outcome]]]:
         """Outcomes of items by their indices, as they come."""
@@ -245,6 +247,8 @@ class _Dispatch(Generic[Item, Value]):
 
     def _step(self) -> list[tuple[int, _Outcome]]:
         """Send what there is room for, and wait for something to end."""
+        if self._broken is not None:
+            return self._mend(self._broken, [], alone=False)
         alone = bool(self._suspects)
         try:
             if alone and not self._running:
@@ -270,7 +274,10 @@ class _Dispatch(Generic[Item, Value]):
                     self._waiting.extendleft([index] for index in reversed(indices))
                 else:
                     finished.append((indices[0], _lost(error)))
-        if broken is not None:
+        if broken is not None and finished and not isinstance(self._executor, Processes):
+            self._broken = broken  # what came with it is handed on, and kept, first
+            self._waiting.append(lost)
+        elif broken is not None:
             finished += self._mend(broken, lost, alone=alone)
         return finished
 
