@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from peakflight.airframe import Airframe
 from peakflight.course import Course, tidy
 from peakflight.errors import (
+    ExecutorFailed,
     InvalidFile,
     InvalidProblem,
     MissingExtra,
@@ -26,6 +27,7 @@ from peakflight.version import __version__
 from peakflight.yaw import Heading
 
 if TYPE_CHECKING:
+    from peakflight.batch import BatchResult, FlightResult, fly_many, plan_many
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
@@ -33,9 +35,11 @@ if TYPE_CHECKING:
         Conditions,
         Crash,
         Flight,
+        FlightAnalysis,
         FlySettings,
         Spread,
         SpreadResult,
+        analyse,
         fly,
         fly_spread,
     )
@@ -50,12 +54,16 @@ __all__ = [
     "KINDS",
     "VEHICLES",
     "Airframe",
+    "BatchResult",
     "ClosestApproach",
     "Conditions",
     "Course",
     "Crash",
+    "ExecutorFailed",
     "FlatStates",
     "Flight",
+    "FlightAnalysis",
+    "FlightResult",
     "FlySettings",
     "Heading",
     "History",
@@ -75,6 +83,7 @@ __all__ = [
     "TrajectoryFile",
     "Vehicle",
     "__version__",
+    "analyse",
     "certify",
     "certify_plan",
     "closest_approach",
@@ -82,11 +91,13 @@ __all__ = [
     "find_vehicle",
     "flat_states",
     "fly",
+    "fly_many",
     "fly_spread",
     "import_trajectory",
     "join",
     "minimum_effort_spline",
     "plan",
+    "plan_many",
     "planned_states",
     "read_course",
     "read_trajectory",
@@ -98,26 +109,32 @@ __all__ = [
 ]
 
 _LAZY = {
+    "BatchResult": "peakflight.batch",
     "ClosestApproach": "peakflight.separation",
     "Conditions": "peakflight.flight",
     "Crash": "peakflight.flight",
     "FlatStates": "peakflight.flatness",
     "Flight": "peakflight.flight",
+    "FlightAnalysis": "peakflight.flight",
+    "FlightResult": "peakflight.batch",
     "FlySettings": "peakflight.flight",
     "Imported": "peakflight.importing",
     "Spread": "peakflight.flight",
     "SpreadResult": "peakflight.flight",
+    "analyse": "peakflight.flight",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
     "closest_approach": "peakflight.separation",
     "discretised_bound": "peakflight.bound",
     "flat_states": "peakflight.flatness",
     "fly": "peakflight.flight",
+    "fly_many": "peakflight.batch",
     "fly_spread": "peakflight.flight",
     "import_trajectory": "peakflight.importing",
     "join": "peakflight.joining",
     "minimum_effort_spline": "peakflight.spline",
     "plan": "peakflight.planner",
+    "plan_many": "peakflight.batch",
     "planned_states": "peakflight.flatness",
     "replan": "peakflight.planner",
     "states_along": "peakflight.flatness",

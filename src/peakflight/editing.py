@@ -24,7 +24,7 @@ from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 from peakflight.version import __version__
-from peakflight.yaw import YAW_KINDS, Heading
+from peakflight.yaw import Heading
 
 ATTITUDE = 2
 """Highest derivative that an edit keeps continuous at least, so that attitude does not jump."""
@@ -310,6 +310,9 @@ def _stretched(plan: Plan, factor: float, note: str) -> Plan:
 
     if not problem.is_at_rest:
         problem = _with_states(problem, slower)
+    if problem.heading is not None and problem.heading.is_about_body:
+        slowed = plan.trajectory.stretch(factor)  # its thrust swings otherwise
+        return steered(plan, problem, slowed, plan.pieces, note)
     yaw = plan.yaw_motion
     return answer(
         plan,
@@ -342,16 +345,18 @@ def _fitted(plan: Plan, *, least: float) -> Plan:
 
 def _is_unproven(plan: Plan) -> bool:
     """Whether nothing is known of the yaw that a pace could mend."""
-    peaks = plan.report.peaks
-    return any(kind.name in peaks and peaks[kind.name].max() >= UNBOUNDED for kind in YAW_KINDS)
+    peaks, heading = plan.report.peaks, plan.problem.heading
+    kinds = () if heading is None else heading.kinds
+    return any(kind.name in peaks and peaks[kind.name].max() >= UNBOUNDED for kind in kinds)
 
 
 def _yaw_stretch(plan: Plan) -> float:
     """How much slower the yaw has to be for its own limits, 0 if nothing limits it."""
-    report = plan.report
+    report, heading = plan.report, plan.problem.heading
+    kinds = () if heading is None else heading.kinds
     needs = [
         float(report.peaks[kind.name].max()) ** (1.0 / kind.order)
-        for kind in YAW_KINDS
+        for kind in kinds
         if kind.name in report.peaks
     ]
     return max(needs, default=0.0)

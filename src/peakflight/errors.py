@@ -19,6 +19,10 @@ class MissingExtra(PeakflightError, ImportError):
     """An optional library is not installed; the message names the extra that brings it."""
 
 
+class ExecutorFailed(PeakflightError, RuntimeError):
+    """What should have run a batch is broken; what it had found is in the batch's store."""
+
+
 LONGEST_QUOTE = 40
 """Characters of a wrong value that a message shows."""
 

@@ -17,7 +17,7 @@ from peakflight.planner import plan as plan_course
 from peakflight.problem import Problem
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
-from peakflight.yaw import YAW_KINDS, Heading, heading_field
+from peakflight.yaw import FIELDS, Heading
 
 METHOD = "joint"
 """How a transition is planned: the fastest."""
@@ -175,10 +175,15 @@ def _heading(first: Plan, second: Plan, apart: bool) -> Heading | None:
     if one is not None and one == two and one.angles is None:
         return one
     angles = [part.yaw(part.waypoint_times) for part in (first, second)]
+    asked = [heading for heading in (one, two) if heading is not None]
+    if len({heading.kinds for heading in asked}) > 1:
+        raise InvalidProblem(
+            "the limits of one plan's yaw are about the yaw, those of the other's about the body"
+        )
     limits = {}
-    for kind in YAW_KINDS:
-        name = heading_field(kind)
-        given = [getattr(asked, name) for asked in (one, two) if asked is not None]
+    for name in FIELDS:
+        given = [getattr(heading, name) for heading in asked]
         limits[name] = min((value for value in given if value is not None), default=None)
     passed = np.concatenate((angles[0], angles[1] if apart else angles[1][1:]))
-    return Heading(policy="waypoints", angles=tuple(passed.tolist()), **limits)
+    about = "body" if asked[0].is_about_body else "yaw"
+    return Heading(policy="waypoints", angles=tuple(passed.tolist()), about=about, **limits)

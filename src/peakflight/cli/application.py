@@ -22,6 +22,7 @@ from typing import Any
 import click
 
 import peakflight
+from peakflight.cli.analyse import analyse
 from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.edit import edit
@@ -31,6 +32,7 @@ from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
+from peakflight.cli.plan_many import plan_many
 from peakflight.cli.show import show
 from peakflight.cli.vehicles import vehicles
 from peakflight.errors import PeakflightError
@@ -106,7 +108,9 @@ def application(context: click.Context) -> int:
 
 
 application.add_command(plan)
+application.add_command(plan_many)
 application.add_command(check)
+application.add_command(analyse)
 application.add_command(compare)
 application.add_command(edit)
 application.add_command(import_)

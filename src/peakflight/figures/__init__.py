@@ -19,6 +19,7 @@ from peakflight.figures.derivatives import derivatives_figure
 from peakflight.figures.differences import differences_figure
 from peakflight.figures.flights import Flight, in_sequence, side_by_side
 from peakflight.figures.leg_times import leg_times_figure
+from peakflight.figures.motion_capture import motion_capture_figures
 from peakflight.figures.overlaid_derivatives import overlaid_derivatives_figure
 from peakflight.figures.paths import paths_figure
 from peakflight.figures.rotors import rotors_figure
@@ -34,6 +35,7 @@ __all__ = [
     "differences_figure",
     "in_sequence",
     "leg_times_figure",
+    "motion_capture_figures",
     "overlaid_derivatives_figure",
     "paths_figure",
     "rotors_figure",

@@ -92,12 +92,20 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
     if name in _ready or _config.DISABLE_JIT:
         yield
         return
-    mark = Path(FOLDER) / f"{name}.ready"
-    if not mark.exists():
+    if not is_ready(name):
         log.warning("compiling the planner for this machine, once; this takes some seconds")
     yield
-    mark.touch()
+    _mark(name).touch()
     _ready.add(name)
+
+
+def is_ready(name: str) -> bool:
+    """Whether a set of kernels has been compiled on this machine, or never will be."""
+    return name in _ready or bool(_config.DISABLE_JIT) or _mark(name).exists()
+
+
+def _mark(name: str) -> Path:
+    return Path(FOLDER) / f"{name}.ready"
 
 
 def fresh(array: ArrayLike) -> np.ndarray:
