@@ -227,8 +227,8 @@ def test_scale(plan):
 def test_a_vehicle_and_its_rotors_stay(plain):
     vehicle = pf.find_vehicle("crazyflie-2.1").on_rotors()
     problem = replace(plain.problem, vehicle=vehicle, limits=None)
-    made = editing.answer(plain, problem, plain.trajectory.stretch(1.2), None, "")
-    assert made.feasible
+    made = editing.steered(plain, problem, plain.trajectory.stretch(1.2), plain.pieces, "")
+    assert made.feasible, made.message
     for change in KEEPING.values():
         edited = change(made)
         assert edited.feasible == made.feasible
