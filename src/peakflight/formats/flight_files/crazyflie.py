@@ -10,7 +10,7 @@ import numpy as np
 
 from peakflight.errors import InvalidProblem
 from peakflight.files import PathLike, write_atomically
-from peakflight.formats.coarser import coarsened
+from peakflight.formats.flight_files.coarser import coarsened
 from peakflight.heading import heading
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
