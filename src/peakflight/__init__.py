@@ -28,6 +28,7 @@ from peakflight.yaw import Heading
 if TYPE_CHECKING:
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
+    from peakflight.exporting import ExportReport, export
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
     from peakflight.flight import (
         Conditions,
@@ -54,6 +55,7 @@ __all__ = [
     "Conditions",
     "Course",
     "Crash",
+    "ExportReport",
     "FlatStates",
     "Flight",
     "FlySettings",
@@ -79,6 +81,7 @@ __all__ = [
     "certify_plan",
     "closest_approach",
     "discretised_bound",
+    "export",
     "find_vehicle",
     "flat_states",
     "fly",
@@ -101,6 +104,7 @@ _LAZY = {
     "ClosestApproach": "peakflight.separation",
     "Conditions": "peakflight.flight",
     "Crash": "peakflight.flight",
+    "ExportReport": "peakflight.exporting",
     "FlatStates": "peakflight.flatness",
     "Flight": "peakflight.flight",
     "FlySettings": "peakflight.flight",
@@ -111,6 +115,7 @@ _LAZY = {
     "certify_plan": "peakflight.certificate",
     "closest_approach": "peakflight.separation",
     "discretised_bound": "peakflight.bound",
+    "export": "peakflight.exporting",
     "flat_states": "peakflight.flatness",
     "fly": "peakflight.flight",
     "fly_spread": "peakflight.flight",

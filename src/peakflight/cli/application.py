@@ -26,6 +26,7 @@ from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.edit import edit
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+from peakflight.cli.export import export
 from peakflight.cli.fly import fly
 from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
@@ -107,6 +108,7 @@ def application(context: click.Context) -> int:
 
 application.add_command(plan)
 application.add_command(check)
+application.add_command(export)
 application.add_command(compare)
 application.add_command(edit)
 application.add_command(import_)

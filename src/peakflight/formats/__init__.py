@@ -1,14 +1,25 @@
 """The files that courses come in and that vehicles fly."""
 
 from peakflight.formats.courses import COURSE_READERS, LARGEST_FILE, Reader, read_course
-from peakflight.formats.flight_files import FLIGHT_WRITERS, Writer, write_crazyflie, write_samples
+from peakflight.formats.flight_files import (
+    FLIGHT_FORMATS,
+    FLIGHT_WRITERS,
+    FlightFormat,
+    Writer,
+    find_format,
+    write_crazyflie,
+    write_samples,
+)
 
 __all__ = [
     "COURSE_READERS",
+    "FLIGHT_FORMATS",
     "FLIGHT_WRITERS",
     "LARGEST_FILE",
+    "FlightFormat",
     "Reader",
     "Writer",
+    "find_format",
     "read_course",
     "write_crazyflie",
     "write_samples",

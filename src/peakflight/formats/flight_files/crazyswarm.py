@@ -11,6 +11,16 @@ import numpy as np
 from peakflight.errors import InvalidProblem
 from peakflight.files import PathLike, write_atomically
 from peakflight.formats.flight_files.coarser import coarsened
+from peakflight.formats.flight_files.flight_format import (
+    Encoded,
+    FlightFormat,
+    Precision,
+    Reading,
+    as_text,
+    single,
+    start_note,
+)
+from peakflight.formats.flight_files.table import as_float32, read_table
 from peakflight.heading import heading
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
@@ -26,6 +36,8 @@ LEAST_PIECES = 2
 HEADER = ",".join(
     ["duration"] + [f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(8)]
 )
+NUMBERS = 33
+"""In a row."""
 
 
 def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
@@ -34,7 +46,7 @@ def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
     Yaw is that of `heading`. A yaw motion has finer pieces than the flight: on each of the flight's
     the polynomial of degree 7 nearest to it, with the same yaw, rate and acceleration at both ends;
     a note says how far off that is. Numbers have 9 significant digits, which costs some 3e-8 m, and
-    1e-7 m on pieces of 4 s.
+    1e-7 m on pieces of 4 s. `peakflight.export` makes pieces fewer where there is not room for all.
 
     Returns
     -------
@@ -47,6 +59,28 @@ def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
     InvalidFile
         If the file cannot be written.
     """
+    data, notes = encode(plan)
+    write_atomically(path, data)
+    return notes
+
+
+def encode(plan: Plan, name: str = "") -> Encoded:
+    """The file of a plan; the name does not appear in it."""
+    del name
+    rows, notes = pieces_of(plan)
+    row = ",".join(["%.9g"] * NUMBERS)
+    lines = [HEADER, *(row % tuple(values) for values in rows.tolist())]
+    return Encoded(as_text(lines), notes)
+
+
+def decode(data: bytes) -> tuple[Reading, ...]:
+    """What a Crazyflie flies of a file: every number becomes single precision on board."""
+    _, rows = read_table(data, NUMBERS)
+    return (reading_of(rows),)
+
+
+def pieces_of(plan: Plan) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(K, 33) duration and coefficients of x, y, z and yaw, and notes on what they leave out."""
     trajectory = plan.trajectory
     if trajectory.degree > DEGREE:
         raise InvalidProblem(
@@ -64,27 +98,55 @@ def write_crazyflie(plan: Plan, path: PathLike) -> tuple[str, ...]:
     rows = np.column_stack(
         (flight.segment_times, flight.coefficients.transpose(0, 2, 1).reshape(pieces, -1))
     )
-    row = ",".join(["%.9g"] * rows.shape[1])
-    lines = [HEADER, *(row % tuple(values) for values in (rows + 0.0).tolist())]
-    write_atomically(path, "\n".join(lines) + "\n")
-    return _notes(plan, pieces, off)
+    return rows + 0.0, _notes(plan, pieces, off)  # no negative zeros
+
+
+def reading_of(rows: np.ndarray) -> Reading:
+    """The flight of (K, 33) numbers in single precision."""
+    rows = as_float32(rows)
+    coefficients = rows[:, 1:].reshape(len(rows), 4, DEGREE + 1).transpose(0, 2, 1)
+    return Reading(
+        Trajectory(coefficients[:, :, :3], rows[:, 0]),
+        Trajectory(coefficients[:, :, 3:], rows[:, 0]),
+    )
+
+
+def room(plan: Plan) -> int:
+    """Pieces that the memory of a Crazyflie holds."""
+    del plan
+    return MEMORY_PIECES
+
+
+def yaw_note(off: float) -> tuple[str, ...]:
+    """A note where yaw is off the plan's."""
+    if off <= SAME_YAW:
+        return ()
+    return (
+        f"its yaw is up to {math.degrees(off):.2g} deg off the plan's, which has finer pieces, "
+        "and not proven to keep the yaw limits",
+    )
 
 
 def _notes(plan: Plan, pieces: int, off: float) -> tuple[str, ...]:
-    notes = []
-    if off > SAME_YAW:
-        notes.append(
-            f"its yaw is up to {math.degrees(off):.2g} deg off the plan's, which has finer pieces, "
-            "and not proven to keep the yaw limits"
-        )
+    full: tuple[str, ...] = ()
     if pieces > MEMORY_PIECES:
-        notes.append(
+        full = (
             f"{pieces} pieces: the memory of a Crazyflie holds {MEMORY_PIECES}, and its firmware "
-            "does not check"
+            "does not check",
         )
-    if plan.trajectory.start_time != 0.0:
-        notes.append(
-            f"the plan starts at {plan.trajectory.start_time:g} s; the file has no such time, and "
-            "its flight starts when the Crazyflie is told to"
-        )
-    return tuple(notes)
+    return (*yaw_note(off), *full, *start_note(plan, "the Crazyflie"))
+
+
+FORMAT = FlightFormat(
+    filename="crazyflie.csv",
+    summary="polynomials for a Crazyflie",
+    consumer="Crazyswarm2, and other loaders of Crazyflie trajectories",
+    numbers="9 digits, single precision on board",
+    rules="degree 7; 31 pieces, all trajectories on board together",
+    encode=single(encode),
+    decode=decode,
+    # half a unit in the last place of single precision, some eight times: sums of the powers
+    precision=Precision(position=1e-6, time=1e-6, relative=5e-7),
+    tolerance=1e-4,
+    most_pieces=room,
+)

@@ -1,0 +1,44 @@
+"""Reading back the tables of numbers that flight files are."""
+
+import numpy as np
+
+from peakflight.errors import InvalidFile
+
+
+def read_table(data: bytes, columns: int | None = None) -> tuple[list[str], np.ndarray]:
+    """The names in the first line of a CSV and the (n, columns) numbers below it.
+
+    Raises
+    ------
+    InvalidFile
+        If a line does not have as many numbers as there are names; the message names it.
+    """
+    try:
+        header, *lines = data.decode().splitlines()
+    except (UnicodeDecodeError, ValueError):
+        raise InvalidFile("the file is not a table of text") from None
+    names = header.split(",")
+    if columns is not None and len(names) != columns:
+        raise InvalidFile(f"line 1 has {len(names)} columns; there must be {columns}")
+    if not lines:
+        raise InvalidFile("the file has no row of numbers")
+    rows = np.empty((len(lines), len(names)))
+    for index, line in enumerate(lines):
+        fields = line.split(",")
+        if len(fields) != len(names):
+            raise InvalidFile(
+                f"line {index + 2} has {len(fields)} fields; there must be {len(names)}"
+            )
+        try:
+            rows[index] = [float(field) for field in fields]
+        except ValueError:
+            raise InvalidFile(f"line {index + 2} has a field that is not a number") from None
+    if not np.isfinite(rows).all():
+        place = int(np.argwhere(~np.isfinite(rows))[0, 0]) + 2
+        raise InvalidFile(f"line {place} has a number that is not finite")
+    return names, rows
+
+
+def as_float32(values: np.ndarray) -> np.ndarray:
+    """Numbers as a consumer in single precision has them."""
+    return values.astype(np.float32).astype(float)
