@@ -63,9 +63,10 @@ def export(
     """Write PLAN, a plan.json, as a file that a vehicle flies; of several plans, a show.
 
     What is written is read back at its consumer's precision and proven again. Where a format has
-    not room for all pieces, the flight is planned again with fewer; where rounding exceeds a limit, it
-    is flown slower by as little as keeps it; the output says what that costs. Ends with 0 if the
-    file is proven to keep the limits, 1 if not, 2 if the input is wrong.
+    not room for all pieces, the flight is planned again with fewer; where rounding exceeds a limit,
+    it is flown slower by as little as keeps it; the output says what that costs. The drones of a
+    show keep their paths and stay in step. Ends with 0 if the file is proven to keep the limits, 1
+    if not, 2 if the input is wrong.
 
     \b
     Example:

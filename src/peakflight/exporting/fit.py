@@ -4,7 +4,7 @@ Planning again is left to method joint, whose pieces are its own choice. A plan 
 and the smoothest is met again by the effort that makes it as long.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from peakflight.formats.flight_files import FlightFormat, Reading
 from peakflight.limits import LABELS, Limits
 from peakflight.planner import plan as solve
 from peakflight.result import Plan
+from peakflight.trajectory import Trajectory
 
 METHOD = "joint"
 SNAP = 4
@@ -24,6 +25,8 @@ SLOWER_ROUNDS = 60
 """Most times that a flight is slowed down."""
 STEP = 1.002
 """Least factor by which it is then."""
+MOST_EXCESS = 1.02
+"""Excess over the limits that a step answers: beyond, it may be noise."""
 SLOWEST = 2.0
 """Factor of the time beyond which rounding is not fought by flying slower."""
 AS_LONG = 1e-3
@@ -71,58 +74,87 @@ def held(plan: Plan, reading: Reading, chosen: FlightFormat) -> Held:
     return Held(peaks, names, problems)
 
 
-def fit(plan: Plan, chosen: FlightFormat, *, refit: bool) -> Plan:
-    """The plan, or the shortest flight near it that fits the format and keeps the limits in it.
+def fit(plans: Sequence[Plan], chosen: FlightFormat, *, refit: bool) -> tuple[Plan, ...]:
+    """The plans, or the shortest flights near them that fit the format and keep the limits in it.
+
+    Several plans are a show: they keep their paths, and are slowed down together if at all.
 
     Raises
     ------
     InvalidProblem
         If there is not room and `refit` does not allow, or cannot make, fewer pieces.
     """
-    room = None if chosen.most_pieces is None else chosen.most_pieces(plan)
-    crowded = room is not None and len(plan.trajectory) > room
+    rooms = [None if chosen.most_pieces is None else chosen.most_pieces(plan) for plan in plans]
+    crowded = [
+        room is not None and len(plan.trajectory) > room
+        for plan, room in zip(plans, rooms, strict=True)
+    ]
+    if any(crowded) and (len(plans) > 1 or not refit):
+        index = crowded.index(True)
+        which = f"plan {index + 1}: " if len(plans) > 1 else ""
+        raise InvalidProblem(
+            f"{which}{_too_many(plans[index], rooms[index])}; plan with fewer (max_pieces)"
+        )
     if not refit:
-        if crowded:
-            raise InvalidProblem(f"{_too_many(plan, room)}; refit, or plan with fewer (max_pieces)")
-        return plan
+        return tuple(plans)
+    if len(plans) > 1:
+        return _slowed(plans, chosen) or tuple(plans)
+    return (_fit_one(plans[0], chosen, rooms[0], crowded[0]),)
+
+
+def _fit_one(plan: Plan, chosen: FlightFormat, room: int | None, crowded: bool) -> Plan:
     best: Plan | None = None
     if not crowded:
-        best = _slowed(plan, chosen)
+        slowed = _slowed([plan], chosen)
+        best = None if slowed is None else slowed[0]
         if best is plan:
             return plan
     for candidate in _fewer(plan, room, chosen):
-        slowed = _slowed(candidate, chosen)
-        if slowed is not None and (best is None or slowed.duration < best.duration):
-            best = slowed
+        slowed = _slowed([candidate], chosen)
+        if slowed is not None and (best is None or slowed[0].duration < best.duration):
+            best = slowed[0]
     if best is None and crowded:
         raise InvalidProblem(f"{_too_many(plan, room)}, and {_why_not_fewer(plan, room)}")
     return best or plan
 
 
-def _slowed(plan: Plan, chosen: FlightFormat) -> Plan | None:
-    """The plan, slowed down by as little as makes its file keep the limits; None if nothing does.
+def _slowed(plans: Sequence[Plan], chosen: FlightFormat) -> tuple[Plan, ...] | None:
+    """Plans slowed down by as little as makes their file keep the limits; None if nothing does.
 
     Every factor is rounded anew, so what exceeds is noise in part: steps are small.
     """
     factor = 1.0
+    names = [f"drone_{index}" for index in range(len(plans))]
     for _ in range(SLOWER_ROUNDS):
-        slower = plan if factor == 1.0 else stretched(plan, factor)
-        found = held(slower, chosen.decode(chosen.encode([slower], ["drone"]).data)[0], chosen)
-        if not found.problems:
+        slower = tuple(plans) if factor == 1.0 else stretched(plans, factor)
+        readings = chosen.decode(chosen.encode(slower, names).data)
+        found = [held(*item, chosen) for item in zip(slower, readings, strict=True)]
+        if not any(one.problems for one in found):
             return slower
-        if not plan.problem.is_at_rest:
+        if not all(plan.problem.is_at_rest for plan in plans):
             return None
-        worst = max(found.peaks[name] for name in found.names) / (1.0 + chosen.tolerance)
-        factor *= max(STEP, min(worst, 1.02) ** 0.5)
+        worst = max(one.peaks[name] for one in found for name in one.names)
+        factor *= max(STEP, min(worst / (1.0 + chosen.tolerance), MOST_EXCESS) ** 0.5)
         if factor > SLOWEST:
             return None
     return None
 
 
-def stretched(plan: Plan, factor: float) -> Plan:
-    """The plan flown slower, its yaw with it."""
-    yaw = None if plan.yaw_motion is None else plan.yaw_motion.stretch(factor)
-    return replace(plan, trajectory=plan.trajectory.stretch(factor), yaw_motion=yaw)
+def stretched(plans: Sequence[Plan], factor: float) -> tuple[Plan, ...]:
+    """Plans flown slower, their yaw and their delays with them, from when the first one starts."""
+    first = min(plan.trajectory.start_time for plan in plans)
+
+    def slower(motion: Trajectory) -> Trajectory:
+        return motion.stretch(factor).shift((factor - 1.0) * (motion.start_time - first))
+
+    return tuple(
+        replace(
+            plan,
+            trajectory=slower(plan.trajectory),
+            yaw_motion=None if plan.yaw_motion is None else slower(plan.yaw_motion),
+        )
+        for plan in plans
+    )
 
 
 def _fewer(plan: Plan, room: int | None, chosen: FlightFormat) -> Iterator[Plan]:

@@ -31,7 +31,8 @@ def export(
     The file is read back at its consumer's precision and its limits are proven again, to the
     format's tolerance. Where a format has not room for all pieces, the flight is planned again with
     fewer (method joint); where rounding exceeds a limit, it is flown slower by as little as keeps
-    it. The report says what that costs.
+    it. The report says what that costs. Several plans keep their paths and stay in step: they are
+    slowed down together, or refused.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def export(
     path = Path(chosen.filename if path is None else path)
     if path.is_dir():
         raise InvalidFile(f"{path}: is a folder; name a file in it")
-    fitted = [fit(one, chosen, refit=refit) for one in plans]
+    fitted = fit(plans, chosen, refit=refit)
     encoded = chosen.encode(fitted, names)
     readings = chosen.decode(encoded.data)
     flights = tuple(

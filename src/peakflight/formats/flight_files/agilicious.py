@@ -67,7 +67,7 @@ def encode(plan: Plan, name: str = "") -> Encoded:
     )
     row = ",".join(["%.9g"] * len(COLUMNS))
     lines = [",".join(COLUMNS), *(row % tuple(values) for values in (table + 0.0).tolist())]
-    notes = (*beyond(states.rotor_thrust, plan.vehicle), *start_note(plan, "the vehicle"))
+    notes = (*beyond(states.rotor_thrust, plan.vehicle), *start_note([plan], "the vehicle"))
     return Encoded(as_text(lines), notes)
 
 

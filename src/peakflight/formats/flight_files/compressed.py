@@ -88,7 +88,7 @@ def curves_of(plan: Plan) -> tuple[Curves, tuple[str, ...]]:
             f"a control point; the format holds {LARGEST * MILLI:.3f} m"
         )
     turns = (YAW_NOTE,) if whole[:, :, 3].any() else ()
-    return curves, (*yaw_note(off), *turns, *start_note(plan, "the Crazyflie"))
+    return curves, (*yaw_note(off), *turns, *start_note([plan], "the Crazyflie"))
 
 
 def packed(curves: Curves) -> bytes:

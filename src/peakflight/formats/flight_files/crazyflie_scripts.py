@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from peakflight.errors import InvalidProblem
 from peakflight.formats.flight_files import compressed, crazyswarm
 from peakflight.formats.flight_files.flight_format import (
     Encoded,
@@ -64,7 +65,19 @@ def decode_compressed(data: bytes) -> tuple[Reading, ...]:
 
 
 def encode_crazyswarm2(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
-    """A script for Crazyswarm2, a robot for each plan."""
+    """A script for Crazyswarm2, a robot for each plan.
+
+    Raises
+    ------
+    InvalidProblem
+        If the plans do not start at the same time.
+    """
+    starts = {plan.trajectory.start_time for plan in plans}
+    if len(starts) > 1:
+        raise InvalidProblem(
+            f"the plans start at {', '.join(f'{start:g}' for start in sorted(starts))} s; "
+            "Crazyswarm2 starts all at once"
+        )
     flights, notes = [], []
     for plan, name in zip(plans, names, strict=True):
         rows, said = crazyswarm.pieces_of(plan)

@@ -134,7 +134,7 @@ def _notes(plan: Plan, pieces: int, off: float) -> tuple[str, ...]:
             f"{pieces} pieces: the memory of a Crazyflie holds {MEMORY_PIECES}, and its firmware "
             "does not check",
         )
-    return (*yaw_note(off), *full, *start_note(plan, "the Crazyflie"))
+    return (*yaw_note(off), *full, *start_note([plan], "the Crazyflie"))
 
 
 FORMAT = FlightFormat(

@@ -97,13 +97,14 @@ def as_text(lines: Sequence[str]) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def start_note(plan: Plan, what: str) -> tuple[str, ...]:
-    """A note where a plan has a start time, which most files have not."""
-    if plan.trajectory.start_time == 0.0:
+def start_note(plans: Sequence[Plan], what: str) -> tuple[str, ...]:
+    """A note where plans have a start time, which most files have not."""
+    first = min(plan.trajectory.start_time for plan in plans)
+    if first == 0.0:
         return ()
     return (
-        f"the plan starts at {plan.trajectory.start_time:g} s; the file has no such time, and its "
-        f"flight starts when {what} is told to",
+        f"the plan starts at {first:g} s; the file has no such time, and its flight starts when "
+        f"{what} is told to",
     )
 
 

@@ -73,7 +73,7 @@ def _encoded(template: str, plan: Plan) -> Encoded:
         set_points=rows_text(rows),
         height=f"{max(HEIGHT, float(plan.trajectory.coefficients[0, 0, 2])):.9g}",
     )
-    return Encoded(text, start_note(plan, "the vehicle"))
+    return Encoded(text, start_note([plan], "the vehicle"))
 
 
 _SHARED = {

@@ -50,6 +50,7 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
     if len(set(topics)) != len(topics):
         raise InvalidProblem(f"two drones have the same topic: {', '.join(sorted(topics))}")
     store = from_library["get_typestore"](from_library["Stores"].ROS2_JAZZY)
+    first = min(plan.trajectory.start_time for plan in plans)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
         writer = from_library["Writer"](
@@ -58,15 +59,10 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
         with writer:
             for plan, topic in zip(plans, topics, strict=True):
                 connection = writer.add_connection(topic, TYPE, typestore=store)
-                message = _message(plan, store.types)
+                message = _message(plan, first, store.types)
                 writer.write(connection, 0, store.serialize_cdr(message, TYPE))
         data = next(bag.glob("*.mcap")).read_bytes()
-    notes = [
-        f"{name}: {note}"
-        for plan, name in zip(plans, names, strict=True)
-        for note in start_note(plan, "the vehicle")
-    ]
-    return Encoded(data, tuple(notes))
+    return Encoded(data, start_note(plans, "the vehicle"))
 
 
 def decode(data: bytes) -> tuple[Reading, ...]:
@@ -119,9 +115,9 @@ def _topic(name: str) -> str:
     return topic if topic[:1].isalpha() else f"drone_{topic}"
 
 
-def _message(plan: Plan, types: Any) -> Any:
+def _message(plan: Plan, first: float, types: Any) -> Any:
+    """The message of a plan, times from when the first of several starts."""
     times = sample_times(plan, RATE)
-    start = plan.trajectory.start_time
     position, velocity, acceleration = (plan.trajectory(times, order) for order in range(3))
     yaw, rate, turn = (heading(plan)(times, order)[:, 0] for order in range(3))
     vector = types["geometry_msgs/msg/Vector3"]
@@ -140,7 +136,7 @@ def _message(plan: Plan, types: Any) -> Any:
             accelerations=[
                 twist(vector(*acceleration[k].tolist()), vector(0.0, 0.0, float(turn[k])))
             ],
-            time_from_start=_duration(types, round((times[k] - start) * NANO)),
+            time_from_start=_duration(types, round((times[k] - first) * NANO)),
         )
         for k in range(len(times))
     ]

@@ -25,6 +25,7 @@ from peakflight.formats.flight_files.flight_format import (
 )
 from peakflight.formats.flight_files.rounded import (
     DEGREE,
+    LONGEST,
     MILLI,
     Curves,
     control_points,
@@ -49,7 +50,7 @@ CREATED = (1980, 1, 1, 0, 0, 0)
 
 
 def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
-    """The show of several plans, which start together.
+    """The show of several plans; the first one starts with it, others wait for theirs.
 
     Raises
     ------
@@ -57,9 +58,11 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
         If a plan has a degree above 7, too many pieces, or is too far out.
     """
     drones, notes = [], []
+    first = min(plan.trajectory.start_time for plan in plans)
     for plan, name in zip(plans, names, strict=True):
         curves, unit = _curves(plan, name)
         points = _written(curves.points, unit)
+        delay = round((plan.trajectory.start_time - first) * 1e3)
         drones.append(
             {
                 "type": "generic",
@@ -69,7 +72,7 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
                     "landAt": points[-1][-1],
                     "trajectory": {
                         "version": VERSION,
-                        "points": _keypoints(curves.milliseconds, points),
+                        "points": _keypoints(curves.milliseconds, points, delay),
                         "takeoffTime": 0.0,
                     },
                 },
@@ -77,7 +80,6 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
         )
         if heading(plan).coefficients.any():
             notes.append(f"{name}: its yaw is not in the show")
-        notes += [f"{name}: {note}" for note in start_note(plan, "the show")]
     show = {
         "version": VERSION,
         "settings": {},
@@ -91,7 +93,7 @@ def encode(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
         entry = zipfile.ZipInfo(SHOW, CREATED)
         entry.compress_type = zipfile.ZIP_DEFLATED
         archive.writestr(entry, json.dumps(show, allow_nan=False))
-    return Encoded(stream.getvalue(), tuple(notes))
+    return Encoded(stream.getvalue(), (*notes, *start_note(plans, "the show")))
 
 
 def decode(data: bytes) -> tuple[Reading, ...]:
@@ -152,10 +154,13 @@ def _written(points: np.ndarray, unit: float) -> list[list[list[float]]]:
     return values
 
 
-def _keypoints(milliseconds: np.ndarray, points: list[list[list[float]]]) -> list[list[Any]]:
-    """[time, point, control points before it], the first without any."""
-    ends = np.cumsum(milliseconds) / 1000.0
-    keypoints: list[list[Any]] = [[0.0, points[0][0], []]]
+def _keypoints(
+    milliseconds: np.ndarray, points: list[list[list[float]]], delay: int
+) -> list[list[Any]]:
+    """[time, point, control points before it], the first without any, after ms of waiting."""
+    ends = (delay + np.cumsum(milliseconds)) / 1000.0
+    waits = [*range(0, delay, LONGEST), delay]
+    keypoints: list[list[Any]] = [[wait / 1000.0, points[0][0], []] for wait in waits]
     for end, curve in zip(ends.tolist(), points, strict=True):
         inner = [] if all(point == curve[0] for point in curve) else curve[1:-1]
         keypoints.append([end, curve[-1], inner])
@@ -175,7 +180,10 @@ def _reading(keypoints: list[list[Any]]) -> Reading:
             raise ValueError(f"a curve of degree {len(curve) - 1}; degree 7 is read")
         pieces.append([[int(x * (1000 / scale)) for x in point] for point in curve])
     curves = Curves(np.array(milliseconds), np.array(pieces))
-    return Reading(motion(curves, np.full(3, scale * MILLI)))
+    waiting = int(np.ptp(curves.points, axis=1).any(axis=1).argmax())
+    delay = float(curves.milliseconds[:waiting].sum() * MILLI)
+    flight = Curves(curves.milliseconds[waiting:], curves.points[waiting:])
+    return Reading(motion(flight, np.full(3, scale * MILLI)).shift(delay))
 
 
 FORMAT = FlightFormat(
