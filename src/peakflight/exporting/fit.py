@@ -12,7 +12,7 @@ import numpy as np
 
 from peakflight.certificate import certify
 from peakflight.errors import InvalidProblem
-from peakflight.formats.flight_files import FlightFormat, Reading
+from peakflight.formats.flight_files import Encoded, FlightFormat, Reading
 from peakflight.limits import LABELS, Limits
 from peakflight.planner import plan as solve
 from peakflight.result import Plan
@@ -74,7 +74,28 @@ def held(plan: Plan, reading: Reading, chosen: FlightFormat) -> Held:
     return Held(peaks, names, problems)
 
 
-def fit(plans: Sequence[Plan], chosen: FlightFormat, *, refit: bool) -> tuple[Plan, ...]:
+class Written(NamedTuple):
+    """Plans as they are written, and what is read of them."""
+
+    plans: tuple[Plan, ...]
+    encoded: Encoded
+    readings: tuple[Reading, ...]
+    held: tuple[Held, ...]
+
+    @property
+    def keeps(self) -> bool:
+        """Whether every limit that is held is kept."""
+        return not any(one.problems for one in self.held)
+
+    @property
+    def worst(self) -> float:
+        """Largest ratio to a limit that is held."""
+        return max(one.peaks[name] for one in self.held for name in one.names)
+
+
+def fit(
+    plans: Sequence[Plan], names: Sequence[str], chosen: FlightFormat, *, refit: bool
+) -> Written:
     """The plans, or the shortest flights near them that fit the format and keep the limits in it.
 
     Several plans are a show: they keep their paths, and are slowed down together if at all.
@@ -95,48 +116,70 @@ def fit(plans: Sequence[Plan], chosen: FlightFormat, *, refit: bool) -> tuple[Pl
         raise InvalidProblem(
             f"{which}{_too_many(plans[index], rooms[index])}; plan with fewer (max_pieces)"
         )
-    if not refit:
-        return tuple(plans)
+    if any(crowded):
+        return _refitted(plans[0], names, chosen, rooms[0], None)
+    plainly = _written(plans, names, chosen)
+    if not refit or plainly.keeps:
+        return plainly
+    slowed = _slowed(plans, names, chosen, plainly)
     if len(plans) > 1:
-        return _slowed(plans, chosen) or tuple(plans)
-    return (_fit_one(plans[0], chosen, rooms[0], crowded[0]),)
+        return slowed or plainly
+    return _refitted(plans[0], names, chosen, rooms[0], slowed, plainly)
 
 
-def _fit_one(plan: Plan, chosen: FlightFormat, room: int | None, crowded: bool) -> Plan:
-    best: Plan | None = None
-    if not crowded:
-        slowed = _slowed([plan], chosen)
-        best = None if slowed is None else slowed[0]
-        if best is plan:
-            return plan
+def _refitted(
+    plan: Plan,
+    names: Sequence[str],
+    chosen: FlightFormat,
+    room: int | None,
+    slowed: Written | None,
+    plainly: Written | None = None,
+) -> Written:
+    """The shortest of a flight slowed down and those with fewer pieces, else the plain one."""
+    best = slowed
     for candidate in _fewer(plan, room, chosen):
-        slowed = _slowed([candidate], chosen)
-        if slowed is not None and (best is None or slowed[0].duration < best.duration):
-            best = slowed[0]
-    if best is None and crowded:
+        first = _written([candidate], names, chosen)
+        found = first if first.keeps else _slowed([candidate], names, chosen, first)
+        if found is not None and (best is None or _duration(found) < _duration(best)):
+            best = found
+    if best is not None:
+        return best
+    if plainly is None:
         raise InvalidProblem(f"{_too_many(plan, room)}, and {_why_not_fewer(plan, room)}")
-    return best or plan
+    return plainly
 
 
-def _slowed(plans: Sequence[Plan], chosen: FlightFormat) -> tuple[Plan, ...] | None:
+def _duration(written: Written) -> float:
+    return written.plans[0].duration
+
+
+def _written(plans: Sequence[Plan], names: Sequence[str], chosen: FlightFormat) -> Written:
+    encoded = chosen.encode(plans, names)
+    readings = chosen.decode(encoded.data)
+    found = tuple(held(*item, chosen) for item in zip(plans, readings, strict=True))
+    return Written(tuple(plans), encoded, readings, found)
+
+
+def _slowed(
+    plans: Sequence[Plan], names: Sequence[str], chosen: FlightFormat, found: Written
+) -> Written | None:
     """Plans slowed down by as little as makes their file keep the limits; None if nothing does.
+
+    `found` is what they are as they stand.
 
     Every factor is rounded anew, so what exceeds is noise in part: steps are small.
     """
+    if not all(plan.problem.is_at_rest for plan in plans):
+        return None
     factor = 1.0
-    names = [f"drone_{index}" for index in range(len(plans))]
     for _ in range(SLOWER_ROUNDS):
-        slower = tuple(plans) if factor == 1.0 else stretched(plans, factor)
-        readings = chosen.decode(chosen.encode(slower, names).data)
-        found = [held(*item, chosen) for item in zip(slower, readings, strict=True)]
-        if not any(one.problems for one in found):
-            return slower
-        if not all(plan.problem.is_at_rest for plan in plans):
-            return None
-        worst = max(one.peaks[name] for one in found for name in one.names)
-        factor *= max(STEP, min(worst / (1.0 + chosen.tolerance), MOST_EXCESS) ** 0.5)
+        excess = found.worst / (1.0 + chosen.tolerance)
+        factor *= max(STEP, min(excess, MOST_EXCESS) ** 0.5)
         if factor > SLOWEST:
             return None
+        found = _written(stretched(plans, factor), names, chosen)
+        if found.keeps:
+            return found
     return None
 
 

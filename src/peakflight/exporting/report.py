@@ -9,8 +9,9 @@ import numpy as np
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 
-SAMPLES = 64
-"""Points of every piece, of either motion, at which two motions are compared."""
+FEWEST, MOST, IN_ALL = 2, 64, 100_000
+"""Points of every piece at which two motions are compared: least and most, and about how many in
+all."""
 ORDERS = 3
 """Position, velocity and acceleration are compared."""
 
@@ -140,7 +141,7 @@ class _Header:
 def differences(first: Trajectory, second: Trajectory) -> Differences:
     """Largest distances between two motions at the same part of their durations.
 
-    Sampled at 64 points of every piece of either.
+    Sampled at up to 64 points of every piece of either.
     """
     parts = np.union1d(_parts(first), _parts(second))
     found = []
@@ -181,7 +182,8 @@ def yaw_difference(plan: Plan, yaw: Trajectory | None) -> float:
 
 def _parts(motion: Trajectory) -> np.ndarray:
     """Where a motion is sampled, as parts of its duration: inside pieces, off the joints."""
-    u = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    count = min(max(IN_ALL // len(motion), FEWEST), MOST)
+    u = (np.arange(count) + 0.5) / count
     times = motion.breakpoints[:-1, None] + motion.segment_times[:, None] * u
     parts: np.ndarray = (times.ravel() - motion.start_time) / (motion.end_time - motion.start_time)
     return np.concatenate((parts, [0.0, 1.0]))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from peakflight.certificate import certify_plan
 from peakflight.errors import InvalidFile, InvalidProblem
-from peakflight.exporting.fit import fit, held
+from peakflight.exporting.fit import Held, fit
 from peakflight.exporting.report import (
     ExportedFlight,
     ExportReport,
@@ -66,20 +66,19 @@ def export(
     path = Path(chosen.filename if path is None else path)
     if path.is_dir():
         raise InvalidFile(f"{path}: is a folder; name a file in it")
-    fitted = fit(plans, chosen, refit=refit)
-    encoded = chosen.encode(fitted, names)
-    readings = chosen.decode(encoded.data)
+    written = fit(plans, names, chosen, refit=refit)
     flights = tuple(
-        _flight(*item, chosen) for item in zip(names, plans, fitted, readings, strict=True)
+        _flight(*item)
+        for item in zip(names, plans, written.plans, written.readings, written.held, strict=True)
     )
-    write_atomically(path, encoded.data)
+    write_atomically(path, written.encoded.data)
     return ExportReport(
         format=name,
         path=path,
-        size=len(encoded.data),
+        size=len(written.encoded.data),
         tolerance=chosen.tolerance,
         flights=flights,
-        notes=(*_cost_notes(flights), *encoded.notes),
+        notes=(*_cost_notes(flights), *written.encoded.notes),
     )
 
 
@@ -112,11 +111,8 @@ def _check(name: str, chosen: FlightFormat, plans: Sequence[Plan]) -> None:
             raise InvalidProblem(f"{which} is not proven to keep its limits: {proof.problems[0]}")
 
 
-def _flight(
-    name: str, plan: Plan, fitted: Plan, reading: Reading, chosen: FlightFormat
-) -> ExportedFlight:
+def _flight(name: str, plan: Plan, fitted: Plan, reading: Reading, kept: Held) -> ExportedFlight:
     flown = reading.trajectory
-    kept = held(fitted, reading, chosen)
     return ExportedFlight(
         name=name,
         duration=flown.duration,
