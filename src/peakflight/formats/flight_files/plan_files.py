@@ -2,6 +2,7 @@
 
 import io
 import json
+import zipfile
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def decode_npz(data: bytes) -> tuple[Reading, ...]:
             start = float(arrays["start_time"])
             flight = Trajectory(arrays["coefficients"], arrays["segment_times"], start)
             yaw = Trajectory(arrays["yaw_coefficients"], arrays["yaw_segment_times"], start)
-    except (ValueError, KeyError, OSError, EOFError, TypeError) as error:
+    except (ValueError, KeyError, OSError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise InvalidFile(f"the file does not have the arrays of a flight ({error})") from None
     return (Reading(flight, yaw),)
 
