@@ -191,10 +191,8 @@ def test_a_reading_beyond_its_limits_is_found(plan: pf.Plan) -> None:
 def test_a_show_keeps_paths_steps_and_delays(plan: pf.Plan, tmp_path: Path) -> None:
     late = replace(plan, trajectory=plan.trajectory.translate([2.0, 0.0, 0.0]).shift(1.5))
     late = replace(late, yaw_motion=plan.yaw_motion.shift(1.5))
-    late = replace(
-        late,
-        problem=replace(late.problem, waypoints=late.problem.waypoints + np.array([2.0, 0, 0])),
-    )
+    moved = late.problem.waypoints + np.array([2.0, 0.0, 0.0])
+    late = replace(late, problem=replace(late.problem, waypoints=moved))
     for name in ("skyc", "ros2"):
         report = pf.export([plan, late], to=name, path=tmp_path / "show", names=["a", "b"])
         first, second = report.flights

@@ -5,6 +5,7 @@ import io
 import json
 import struct
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 
 import jsonschema
@@ -231,20 +232,18 @@ def test_a_show_is_a_zip_with_what_skybrush_declares(plan: pf.Plan, tmp_path: Pa
     points = drones[0]["settings"]["trajectory"]["points"]
     assert points[0][2] == []
     assert {len(point[2]) for point in points[1:]} <= {0, 6}
-    assert all(after[0] > before[0] for before, after in zip(points, points[1:], strict=False))
+    assert all(after[0] > before[0] for before, after in pairwise(points))
 
 
 def test_a_show_through_the_servers_encoder(plan: pf.Plan, tmp_path: Path) -> None:
-    """By the rules of skybrush-server's SegmentEncoder: cut off to mm, ms by floor, types 0 to 3."""
+    """By the rules of skybrush-server's SegmentEncoder: cut off to mm, ms by floor."""
     report = pf.export(plan, to="skyc", path=tmp_path / "show.skyc")
     with zipfile.ZipFile(io.BytesIO((tmp_path / "show.skyc").read_bytes())) as archive:
         points = json.loads(archive.read("show.json"))["swarm"]["drones"][0]["settings"]
     keypoints = points["trajectory"]["points"]
     flown = report.flights[0].trajectory
     time = 0
-    for k, ((before, start, _), (after, end, via)) in enumerate(
-        zip(keypoints, keypoints[1:], strict=False)
-    ):
+    for k, ((before, start, _), (after, end, via)) in enumerate(pairwise(keypoints)):
         duration = int(np.floor(round(after - before, 3) * 1000))
         series = np.array([[int(x * 1000) for x in point] for point in (start, *via, end)])
         assert np.abs(series).max() < 2**15

@@ -1,4 +1,4 @@
-"""Generated scripts, run dry: real libraries where they are installed, recorded links below them."""
+"""Generated scripts, run dry: the real libraries where there are any, over recorded links."""
 
 import asyncio
 import importlib.util
@@ -152,9 +152,6 @@ def fly_cflib(module: ModuleType, clock: Clock) -> Link:
     module.cflib.crtp.init_drivers = lambda: None
     assert module.main(["radio://0/1"]) == 0
     return link
-
-
-DEFINE, START, TAKE_OFF, LAND, GO_TO, STOP = 6, 13, 7, 8, 12, 3
 
 
 @pytest.mark.parametrize("name", ["cflib", "cflib-compressed"])
