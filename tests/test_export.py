@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import peakflight as pf
 from peakflight.exporting.fit import held, stretched
+from peakflight.exporting.merging import merged
 from peakflight.formats import FLIGHT_FORMATS, find_format, read_course
 from peakflight.formats.flight_files.flight_format import Reading, through_samples
 from peakflight.formats.flight_files.rounded import control_points, motion, rounded
@@ -326,6 +327,21 @@ def test_rounded_curves_are_exact_on_whole_numbers() -> None:
     again = rounded(control_points(flight), flight.segment_times, unit)
     np.testing.assert_array_equal(again.points, whole)
     np.testing.assert_array_equal(again.milliseconds, [400, 800, 65, 1203])
+
+
+def test_merged_pieces_keep_waypoints_and_joints(long_plan: pf.Plan) -> None:
+    fewer = merged(long_plan, 20)
+    assert len(fewer.trajectory) == sum(fewer.pieces) == 20
+    assert fewer.duration == pytest.approx(long_plan.duration)
+    places = fewer.trajectory(fewer.waypoint_times)
+    np.testing.assert_allclose(places, long_plan.problem.waypoints, atol=1e-9)
+    for t in fewer.trajectory.breakpoints[1:-1]:
+        for order in range(4):
+            before, after = (fewer.trajectory(t + side, order) for side in (-1e-9, 1e-9))
+            there = long_plan.trajectory(t, order)
+            np.testing.assert_allclose(before, after, atol=1e-4)
+            np.testing.assert_allclose(after, there, atol=1e-4)
+    assert len(merged(long_plan, 1).trajectory) == len(long_plan.pieces)
 
 
 def test_samples_are_read_as_the_quintics_through_them() -> None:

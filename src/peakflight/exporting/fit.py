@@ -38,7 +38,7 @@ AS_LONG = 1e-3
 """Part of its duration by which a plan made again may be shorter, to count as the same."""
 EFFORT_ORDERS = {"acceleration": 2, "jerk": 3, "snap": 4}
 """Derivative that effort weighs, by what a problem minimizes."""
-PIECES_A_LEG = (1.5, 1.0)
+PIECES_A_LEG = (1.5, 1.25, 1.0)
 """Pieces in each leg that are tried too where rounding punishes short ones."""
 EFFORT_ROUNDS, EFFORTS = 10, 1e6
 """Halvings of the range of efforts, and its width on either side of the natural one."""
