@@ -13,7 +13,9 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 def main() -> int:
     """Run them in fresh processes, from the root; returns how many failed."""
-    jobs = [(path.name, path.read_text()) for path in sorted(Path(__file__).parent.glob("0*.py"))]
+    jobs = [
+        (path.name, path.read_text()) for path in sorted(Path(__file__).parent.glob("[0-9]*.py"))
+    ]
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
         blocks = BLOCK.findall(page.read_text())
         if blocks:
