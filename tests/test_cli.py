@@ -15,6 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import peakflight as pf
+import peakflight.exporting.writing
 import peakflight.planner
 from peakflight.cli.application import application
 from peakflight.cli.folder import folder_for
@@ -22,7 +23,8 @@ from peakflight.cli.options import parse_limits, written
 from peakflight.cli.output import ranges, seconds
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
-from peakflight.formats import FLIGHT_WRITERS
+from peakflight.formats import FLIGHT_FORMATS
+from peakflight.formats.flight_files import USUAL
 from peakflight.limits import PAPER_LIMITS
 from peakflight.methods import METHODS
 
@@ -30,7 +32,7 @@ Run = Callable[..., Result]
 
 WAYPOINTS = [[0, 0, 1], [0.6, 0.5, 1.2], [0.2, 0.9, 1.0], [0.9, 1.3, 1.1], [3.2, 1.2, 1.4]]
 PICTURES = {"course.png", "derivatives.png", "segment_times.png"}
-DATA = {"plan.json", *(writer.filename for writer in FLIGHT_WRITERS.values())}
+DATA = {"plan.json", *(FLIGHT_FORMATS[name].filename for name in USUAL)}
 CONTRACT = {
     "status",
     "method",
@@ -336,7 +338,7 @@ class TestPlan:
         result = run("plan", "big.csv", *QUICK, "--export", "crazyflie")
         assert result.exit_code == 0
         assert "big: 5000 waypoints, 4999 legs" in result.stdout
-        assert "the memory of a Crazyflie holds" in result.stdout
+        assert "note: no crazyflie.csv: the flight has 4999 pieces; there is room" in result.stdout
         assert len(result.stdout.splitlines()) < 60
         assert run("check", "big-plan/plan.json").exit_code == 0
 
@@ -695,11 +697,10 @@ class TestOutputFolder:
     def test_a_full_disk_is_reported_by_the_final_name(
         self, run: Run, folder: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def fail(_: pf.Plan, path: Path) -> tuple[str, ...]:
+        def fail(path: Path, _: bytes) -> None:
             raise pf.InvalidFile(f"{path}: cannot be written (no space left on device)")
 
-        writer = FLIGHT_WRITERS["samples"]._replace(write=fail)
-        monkeypatch.setitem(FLIGHT_WRITERS, "samples", writer)
+        monkeypatch.setattr(peakflight.exporting.writing, "write_atomically", fail)
         result = run("plan", "lap.csv", "-o", "out", *QUICK)
         refused(result, f"{Path('out/samples.csv')}: cannot be written (no space")
         assert names(folder / "out") == {"plan.json"}

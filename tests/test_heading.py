@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import peakflight as pf
 from peakflight.errors import InvalidProblem
 from peakflight.formats import write_crazyflie, write_samples
-from peakflight.formats.coarser import coarsened
+from peakflight.formats.flight_files.coarser import coarsened
 from peakflight.yaw import as_heading, unwrapped
 from peakflight.yaw_certificate import certify_yaw
 from peakflight.yaw_motion import directions, turning

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from peakflight.batch import BatchResult, FlightResult, fly_many, plan_many
     from peakflight.bound import discretised_bound
     from peakflight.certificate import certify, certify_plan, stretch_to_limits
+    from peakflight.exporting import ExportReport, export
     from peakflight.flatness import FlatStates, flat_states, planned_states, states_along
     from peakflight.flight import (
         Conditions,
@@ -60,6 +61,7 @@ __all__ = [
     "Course",
     "Crash",
     "ExecutorFailed",
+    "ExportReport",
     "FlatStates",
     "Flight",
     "FlightAnalysis",
@@ -88,6 +90,7 @@ __all__ = [
     "certify_plan",
     "closest_approach",
     "discretised_bound",
+    "export",
     "find_vehicle",
     "flat_states",
     "fly",
@@ -113,6 +116,7 @@ _LAZY = {
     "ClosestApproach": "peakflight.separation",
     "Conditions": "peakflight.flight",
     "Crash": "peakflight.flight",
+    "ExportReport": "peakflight.exporting",
     "FlatStates": "peakflight.flatness",
     "Flight": "peakflight.flight",
     "FlightAnalysis": "peakflight.flight",
@@ -126,6 +130,7 @@ _LAZY = {
     "certify_plan": "peakflight.certificate",
     "closest_approach": "peakflight.separation",
     "discretised_bound": "peakflight.bound",
+    "export": "peakflight.exporting",
     "flat_states": "peakflight.flatness",
     "fly": "peakflight.flight",
     "fly_many": "peakflight.batch",

@@ -27,6 +27,7 @@ from peakflight.cli.check import check
 from peakflight.cli.compare import compare
 from peakflight.cli.edit import edit
 from peakflight.cli.exit_codes import BAD_INPUT, INTERRUPTED
+from peakflight.cli.export import export
 from peakflight.cli.fly import fly
 from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
@@ -111,6 +112,7 @@ application.add_command(plan)
 application.add_command(plan_many)
 application.add_command(check)
 application.add_command(analyse)
+application.add_command(export)
 application.add_command(compare)
 application.add_command(edit)
 application.add_command(import_)

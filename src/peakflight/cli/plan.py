@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
+from peakflight.cli.export import FormatName
 from peakflight.cli.folder import OutputFolder, folder_for
 from peakflight.cli.options import (
     FolderPath,
@@ -20,7 +21,8 @@ from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
 from peakflight.cli.yaw_options import heading_of, yaw_options
 from peakflight.errors import InvalidProblem, MissingExtra
-from peakflight.formats import FLIGHT_WRITERS
+from peakflight.formats import FLIGHT_FORMATS
+from peakflight.formats.flight_files import USUAL
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
@@ -105,8 +107,10 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
     "--export",
     "exports",
     multiple=True,
-    type=click.Choice(tuple(FLIGHT_WRITERS)),
-    help="Flight file to write; may be repeated. By default all.",
+    metavar="FORMAT",
+    type=FormatName(),
+    help=f"Flight file to write; may be repeated. By default {' and '.join(USUAL)}; peakflight "
+    "export --list shows all.",
 )
 @click.option("--no-figures", is_flag=True, help="Draw no pictures, which saves half a second.")
 @click.option(
@@ -159,6 +163,9 @@ def plan(
     }
     tuning = {name: value for name, value in tuning.items() if value is not None}
     method = _method(method, tuning)
+    for name in exports:
+        if FLIGHT_FORMATS[name].needs_vehicle and vehicle is None:
+            raise click.UsageError(f"--export {name} needs --vehicle")
     with Progress() as progress:
         progress.stage("reading the course")
         read, notes = read_tidied(course, strict=strict)
@@ -238,16 +245,18 @@ def _write(
     files = {"plan": folder.published(PLAN_FILE)}
     if not plan.feasible:
         return files, ("no flight files: the plan is not proven to keep the limits",)
+    from peakflight.exporting import export
+
     notes: list[str] = []
-    for name in exports or FLIGHT_WRITERS:
-        writer = FLIGHT_WRITERS[name]
+    for name in dict.fromkeys(exports or USUAL):
+        filename = FLIGHT_FORMATS[name].filename
         try:
-            said = writer.write(plan, folder.stage / writer.filename)
-        except InvalidProblem as error:
-            notes.append(f"no {writer.filename}: {error}")
+            report = export(plan, to=name, path=folder.stage / filename)
+        except (InvalidProblem, MissingExtra) as error:
+            notes.append(f"no {filename}: {error}")
             continue
-        notes += [f"{writer.filename}: {note}" for note in said]
-        files[name] = folder.published(writer.filename)
+        notes += [f"{filename}: {said}" for said in (*report.problems, *report.notes)]
+        files[name] = folder.published(filename)
     return files, tuple(notes)
 
 
@@ -262,7 +271,7 @@ def _draw(plan: Plan, folder: OutputFolder) -> tuple[dict[str, Path], tuple[str,
 
 def _stale(folder: OutputFolder, files: dict[str, Path]) -> list[str]:
     """Files of an earlier plan that this one has not replaced."""
-    flight_files = [writer.filename for writer in FLIGHT_WRITERS.values()]
+    flight_files = [one.filename for one in FLIGHT_FORMATS.values() if one.filename != PLAN_FILE]
     names = [*flight_files, *(f"{name}.png" for name in PICTURES)]
     written = {path.name for path in files.values()}
     return [name for name in names if name not in written and folder.published(name).exists()]
@@ -270,5 +279,5 @@ def _stale(folder: OutputFolder, files: dict[str, Path]) -> list[str]:
 
 def _summaries() -> dict[str, str]:
     """What each file is, by the names of files."""
-    flight_files = {name: writer.summary for name, writer in FLIGHT_WRITERS.items()}
+    flight_files = {name: one.summary for name, one in FLIGHT_FORMATS.items()}
     return {"plan": "the plan itself; peakflight check proves it", **flight_files, **PICTURES}

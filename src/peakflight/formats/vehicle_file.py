@@ -6,7 +6,7 @@ from typing import Any
 
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.files import PathLike, parse_json, read_text
-from peakflight.formats import json_course, yaml_course
+from peakflight.formats.courses import json_course, yaml_course
 from peakflight.vehicle import Vehicle
 
 FIGURES = {

@@ -6,6 +6,17 @@ import numpy as np
 
 from peakflight.errors import InvalidProblem
 from peakflight.files import PathLike, write_atomically
+from peakflight.formats.flight_files.flight_format import (
+    SET_POINTS,
+    Encoded,
+    FlightFormat,
+    Precision,
+    Reading,
+    as_text,
+    single,
+    through_samples,
+)
+from peakflight.formats.flight_files.table import read_table
 from peakflight.heading import heading
 from peakflight.problem import AXES
 from peakflight.result import Plan
@@ -53,7 +64,15 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
     InvalidFile
         If the file cannot be written.
     """
-    times = _times(plan, rate)
+    data, notes = encode(plan, rate=rate)
+    write_atomically(path, data)
+    return notes
+
+
+def encode(plan: Plan, name: str = "", rate: float = RATE) -> Encoded:
+    """The file of a plan; the name does not appear in it."""
+    del name
+    times = sample_times(plan, rate)
     trajectory = plan.trajectory
     columns = [times, *(trajectory(times, derivative=order).T for order in range(len(UNITS)))]
     names = ["t [s]"]
@@ -67,7 +86,7 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
         from peakflight.flatness import planned_states
 
         states = planned_states(plan, times)
-        notes = _beyond(states.rotor_thrust, plan.vehicle)
+        notes = beyond(states.rotor_thrust, plan.vehicle)
         columns += [states.attitude.T, states.body_rate.T, states.rotor_thrust.T]
         names += STATES
     else:
@@ -75,11 +94,22 @@ def write_samples(plan: Plan, path: PathLike, rate: float = RATE) -> tuple[str, 
     table = np.vstack(columns).T + 0.0  # no negative zeros
     row = "%.15g" + ",%.9g" * (table.shape[1] - 1)
     lines = [",".join(names), *(row % tuple(values) for values in table.tolist())]
-    write_atomically(path, "\n".join(lines) + "\n")
-    return notes
+    return Encoded(as_text(lines), notes)
 
 
-def _beyond(thrusts: np.ndarray, vehicle: Vehicle) -> tuple[str, ...]:
+def decode(data: bytes) -> tuple[Reading, ...]:
+    """The motion through the samples, and the yaw if there is one."""
+    names, rows = read_table(data)
+    times = rows[:, 0]
+    position, velocity, acceleration = (rows[:, 1 + 3 * k : 4 + 3 * k] for k in range(3))
+    yaw = None
+    if YAW_COLUMNS[1] in names:
+        angle, rate, turn = (rows[:, [names.index(column)]] for column in YAW_COLUMNS)
+        yaw = through_samples(times, angle, rate, turn)
+    return (Reading(through_samples(times, position, velocity, acceleration), yaw),)
+
+
+def beyond(thrusts: np.ndarray, vehicle: Vehicle) -> tuple[str, ...]:
     """A note if any of (n, 4) thrusts is out of the range of the rotors."""
     least, most = vehicle.rotor_thrust
     lowest, highest = float(thrusts.min()), float(thrusts.max())
@@ -91,16 +121,41 @@ def _beyond(thrusts: np.ndarray, vehicle: Vehicle) -> tuple[str, ...]:
     )
 
 
-def _times(plan: Plan, rate: float) -> np.ndarray:
+def sample_times(plan: Plan, rate: float) -> np.ndarray:
     """(n,) s, from the start to the end."""
+    trajectory = plan.trajectory
+    count = checked_count(trajectory.duration, rate)
+    return np.append(trajectory.start_time + np.arange(count) / rate, trajectory.end_time)
+
+
+def checked_count(duration: float, rate: float) -> int:
+    """Periods of a rate, Hz, in a duration, s; the last may be shorter.
+
+    Raises
+    ------
+    InvalidProblem
+        If the rate is not positive and finite, or makes more than 5 million rows.
+    """
     if not (math.isfinite(rate) and rate > 0.0):
         raise InvalidProblem(f"rate is {rate:g} Hz; it must be positive and finite")
-    trajectory = plan.trajectory
-    periods = trajectory.duration * rate
+    periods = duration * rate
     if periods >= MOST_ROWS:
         raise InvalidProblem(
-            f"rate is {rate:g} Hz, which makes {periods:.3g} rows of {trajectory.duration:g} s; "
+            f"rate is {rate:g} Hz, which makes {periods:.3g} rows of {duration:g} s; "
             f"{MOST_ROWS} are the most"
         )
-    count = max(1, math.ceil(periods - NEAR_END))
-    return np.append(trajectory.start_time + np.arange(count) / rate, trajectory.end_time)
+    return max(1, math.ceil(periods - NEAR_END))
+
+
+FORMAT = FlightFormat(
+    filename="samples.csv",
+    summary="time, position to snap, yaw and rotor thrusts at 100 Hz",
+    consumer="spreadsheets, simulators, own controllers",
+    numbers="9 digits",
+    rules="5 million rows",
+    encode=single(encode),
+    decode=decode,
+    precision=Precision(position=1e-6, relative=1e-8),
+    tolerance=1e-2,
+    fixed=SET_POINTS,
+)

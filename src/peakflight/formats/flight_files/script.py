@@ -1,0 +1,62 @@
+"""Scripts that fly a plan: a template with the numbers of the flight in it.
+
+The templates in `templates/` are whole programs but for `$names`; libraries of vehicles are
+imported by them alone, never here.
+"""
+
+import ast
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from peakflight.errors import InvalidFile
+from peakflight.limits import plain_unit
+from peakflight.result import Plan
+from peakflight.version import __version__
+
+FOLDER = "templates"
+HEIGHT = 0.5
+"""m: take-off goes at least as high before the vehicle flies to the start."""
+
+
+def script(template: str, **values: Any) -> bytes:
+    """A script: the template's `$names` replaced by values, text as it is."""
+    text = files("peakflight.formats.flight_files").joinpath(FOLDER, template).read_text("utf-8")
+    return Template(text).substitute(version=__version__, **values).encode()
+
+
+def described(plan: Plan) -> str:
+    """A flight in a line: how long, how fast, under which limits."""
+    limits = ", ".join(
+        f"{kind.label} {getattr(plan.problem.limits, kind.name):g} {plain_unit(kind.unit)}"
+        for kind in plan.problem.limits.active
+    )
+    vehicle = "" if plan.vehicle is None else f" for {plan.vehicle.name}"
+    return f"{plan.duration:.2f} s{vehicle}; certified: {limits}"
+
+
+def rows_text(rows: np.ndarray) -> str:
+    """The lines of a list of tuples, numbers with 9 digits."""
+    row = "    (" + ", ".join(["%.9g"] * rows.shape[1]) + "),"
+    return "\n".join(row % tuple(values) for values in (rows + 0.0).tolist())
+
+
+def value_in(data: bytes, name: str) -> Any:
+    """What a script assigns to a name, without running it.
+
+    Raises
+    ------
+    InvalidFile
+        If it is not such a script.
+    """
+    try:
+        for statement in ast.parse(data.decode()).body:
+            if isinstance(statement, ast.Assign) and any(
+                isinstance(target, ast.Name) and target.id == name for target in statement.targets
+            ):
+                return ast.literal_eval(statement.value)
+    except (SyntaxError, ValueError, UnicodeDecodeError) as error:
+        raise InvalidFile(f"the file is not a script of peakflight ({error})") from None
+    raise InvalidFile(f"the file is not a script of peakflight (no {name} in it)")

@@ -1,0 +1,124 @@
+"""`peakflight export`, and `--export` of `peakflight plan`."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+import peakflight as pf
+from peakflight.cli.application import application
+from peakflight.formats import FLIGHT_FORMATS
+
+Run = Callable[..., Result]
+WAYPOINTS = [[0.0, 0.0, 1.0], [0.8, 0.4, 1.2], [1.2, 1.0, 0.9]]
+
+
+@pytest.fixture(scope="module")
+def plan() -> pf.Plan:
+    return pf.plan(WAYPOINTS, vehicle="crazyflie-2.1", pieces=2)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, plan: pf.Plan) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for name in ("one", "two"):
+        Path(name).mkdir()
+        plan.save(Path(name) / "plan.json")
+    Path("lap.csv").write_text("x,y,z\n" + "\n".join(",".join(map(str, p)) for p in WAYPOINTS))
+    return tmp_path
+
+
+@pytest.fixture
+def run() -> Run:
+    def invoke(*arguments: object) -> Result:
+        return CliRunner().invoke(application, [str(argument) for argument in arguments])
+
+    return invoke
+
+
+def refused(result: Result, *words: str) -> None:
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1
+    for word in words:
+        assert word in result.stderr
+
+
+@pytest.mark.parametrize("name", FLIGHT_FORMATS)
+def test_every_format_is_written_beside_the_plan(name: str, run: Run, folder: Path) -> None:
+    result = run("export", "one/plan.json", "--to", name)
+    assert (result.exit_code, result.stderr) == (0, "")
+    path = folder / "one" / FLIGHT_FORMATS[name].filename
+    assert f"wrote {Path('one') / path.name}: {name}, {path.stat().st_size} bytes" in result.stdout
+    assert "proven again as it is read" in result.stdout
+    assert "jumps at joints" in result.stdout
+
+
+def test_json_is_one_object(run: Run) -> None:
+    result = run("export", "one/plan.json", "--to", "crazyflie", "-o", "c.csv", "--json")
+    printed = json.loads(result.stdout)
+    assert (printed["format"], printed["path"], printed["feasible"]) == (
+        "crazyswarm",
+        "c.csv",
+        True,
+    )
+    (flight,) = printed["flights"]
+    assert set(flight["difference"]) == {"position", "velocity", "acceleration"}
+    assert flight["peaks"]["jerk"] <= 1.0001
+    assert Path("c.csv").is_file()
+
+
+def test_a_show_of_two(run: Run) -> None:
+    result = run("export", "one/plan.json", "two/plan.json", "--to", "skyc", "-o", "show.skyc")
+    assert result.exit_code == 0
+    assert [line.split()[0] for line in result.stdout.splitlines() if "%" in line][:2] == [
+        "one",
+        "two",
+    ]
+
+
+def test_no_refit_that_breaks_a_limit_ends_with_1(run: Run) -> None:
+    fine = pf.plan([[0, 0, 1], [0.3, 0, 1], [0.3, 0.3, 1]], vehicle="crazyflie-2.1", pieces=4)
+    fine.save("fine.json")
+    result = run("export", "fine.json", "--to", "skyc", "--no-refit")
+    assert result.exit_code == 1
+    assert "not proven to keep the limits as it is read" in result.stdout
+    assert "is allowed for rounding" in result.stderr
+    again = run("export", "fine.json", "--to", "skyc", "--json")
+    assert json.loads(again.stdout)["flights"][0]["cost"] > 0.1
+
+
+def test_list_names_every_format(run: Run) -> None:
+    listed = run("export", "--list").stdout
+    assert all(f"{name}: {one.summary}" in listed for name, one in FLIGHT_FORMATS.items())
+    formats = json.loads(run("export", "--list", "--json").stdout)["formats"]
+    assert [one["name"] for one in formats] == list(FLIGHT_FORMATS)
+
+
+def test_bad_input_is_one_line(run: Run, folder: Path) -> None:
+    refused(run("export"), "name a plan")
+    refused(run("export", "one/plan.json"), "--to FORMAT is missing; one of samples")
+    refused(run("export", "one/plan.json", "--to", "pdf"), "'pdf' is not one of")
+    refused(run("export", "none.json", "--to", "px4"), "none.json: no such file")
+    refused(run("export", "lap.csv", "--to", "px4"), "lap.csv: line 1 is not JSON")
+    refused(run("export", "one/plan.json", "--to", "px4", "-o", "two"), "two: is a folder")
+    refused(run("export", "one/plan.json", "two/plan.json", "--to", "px4"), "holds one drone")
+    refused(run("export", "one/plan.json", "--to", "px4", "-o", "no/f.py"), "cannot be written")
+    values = json.loads(Path("one/plan.json").read_text())
+    values["problem"]["vehicle"] = None
+    Path("bare.json").write_text(json.dumps(values))
+    refused(run("export", "bare.json", "--to", "agilicious"), "needs a vehicle")
+    assert sorted(path.name for path in folder.iterdir()) == ["bare.json", "lap.csv", "one", "two"]
+
+
+def test_plan_writes_what_it_is_asked_for(run: Run, folder: Path) -> None:
+    options = ("--vehicle", "crazyflie-2.1", "--pieces", "1", "--no-figures", "-o", "out")
+    asked = ("crazyflie", "agilicious", "skyc", "cflib")
+    result = run("plan", "lap.csv", *options, *(f"--export={name}" for name in asked))
+    assert result.exit_code == 0
+    names = {"plan.json", "crazyflie.csv", "agilicious.csv", "show.skyc", "fly_cflib.py"}
+    assert {path.name for path in (folder / "out").iterdir()} == names
+    assert "full state and rotor thrusts at 100 Hz" in result.stdout
+    refused(run("plan", "lap.csv", "--export", "agilicious"), "--export agilicious needs --vehicle")
