@@ -360,7 +360,10 @@ def factors(time, grid):
 
 
 def sample(data, time, grid):
-    """Samples, without gravity, and rates (3, 4, S); the piece does not come first, to see where they are put."""
+    """Samples, without gravity, and rates (3, 4, S).
+
+    The piece does not come first, to see that they are put where they belong.
+    """
     samples, rates = (np.full((3, 3, grid.table.shape[1]), NAN) for _ in range(2))
     call_sample(
         data.copy(), grid.orders, grid.steps, *factors(time, grid), grid.table, 1, samples, rates
@@ -447,8 +450,8 @@ def test_push_is_the_transpose_of_pull(degree):
     moves = pull(steps, lengthening, rates, time, grid)
     carried = np.full(data.shape, NAN)
     along = call_push(
-        pulls.reshape(1, 3, -1).copy(), *factors(time, grid), rates.reshape(1, 3, -1), grid.table, 0,
-        carried,
+        pulls.reshape(1, 3, -1).copy(), *factors(time, grid), rates.reshape(1, 3, -1),
+        grid.table, 0, carried,
     )  # fmt: skip
     size = (np.abs(pulls) * np.abs(moves)).sum()
     assert (carried * steps).sum() + along * lengthening == pytest.approx(

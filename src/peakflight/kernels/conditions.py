@@ -58,7 +58,7 @@ class Grid(NamedTuple):
     still: np.ndarray
     """(1,) int: how many of them are without the step."""
     products: np.ndarray
-    """(4 S, P and some that are zero) of table rows: see `pieces.VECTOR`."""
+    """(4 S, P or more) of table rows; zeros fill up the last vector: see `pieces.VECTOR`."""
     steps: np.ndarray
     """(4 S,) derivative, 1 to 4, in each column of the table."""
     dense_steps: np.ndarray
@@ -201,7 +201,7 @@ def _effort(effort, grid, limited, work, k, time):
 
 @inner
 def _pull_effort(effort, grid, limited, work, k, time, sums):
-    """Sums (1, 3, 4, S) += slope of a piece's effort by its samples; returns its own by log time."""
+    """Sums (1, 3, 4, S) += slope of a piece's effort by samples; returns its own by log time."""
     direct = 0.0
     if effort is None:
         return direct
@@ -320,14 +320,14 @@ def assemble(layout, grid, limited, work, x):
                 )  # fmt: skip
         wanted = grid.pairs.shape[0] if layout.steps[k] else grid.still[0]
         pieces.curvature(
-            flat_weights, work.rates, k, powers, scales, grid.table, grid.pairs, wanted, grid.products,
-            sums, turned, columns, local,
+            flat_weights, work.rates, k, powers, scales, grid.table, grid.pairs, wanted,
+            grid.products, sums, turned, columns, local,
         )  # fmt: skip
         local[last, last] += time * (1.0 + work.stiffness[k])
         _add_outer(limited.several, grid, limited, work, k, powers, scales, local)
         _add_effort(
-            limited.effort, grid, limited, work, k, time, powers, scales, weights, flat_weights, sums,
-            turned, columns, local,
+            limited.effort, grid, limited, work, k, time, powers, scales, weights, flat_weights,
+            sums, turned, columns, local,
         )  # fmt: skip
         _scatter(layout, k, local, work.matrix)
 

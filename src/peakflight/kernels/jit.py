@@ -107,7 +107,8 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
 @contextmanager
 def _uncollected() -> Iterator[None]:
     """Without collection of cyclic garbage: the compiler makes millions of objects, of which little
-    is garbage, and looking for it takes a tenth of its time."""
+    is garbage, and looking for it takes a tenth of its time.
+    """
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -12,8 +12,8 @@ where o_r is the order of row r. To acceleration, s = 2, gravity is added.
 
 Derivatives 1 to 4 at S points stand one after the other: 4 S numbers an axis. Two long loops do all
 the work, `derive` from end data to samples and `carry` back; the factors t^o_r and t^-s of a piece
-are `factors`. Loops over axes and derivatives have no literal bounds, or the compiler would write
-each of them out a dozen times, which takes long and makes nothing faster.
+are `factors`. Long loops stand inside of loops over axes without literal bounds, or the compiler
+would write each of them out for every axis, which takes long and makes nothing faster.
 """
 
 import numpy as np
@@ -23,13 +23,14 @@ from peakflight.kernels.jit import inner, vector
 SIX = ((0, 1, 2), (1, 3, 4), (2, 4, 5))
 """Where the entries of a symmetric matrix stand among xx, xy, xz, yy, yz, zz."""
 SIXTH = np.array(SIX)
+"""The same, for loops that the compiler is not to write out."""
 VECTOR = 8
-"""Numbers that a processor may work on at once; whole vectors are quicker than what is left of one."""
+"""Numbers that a processor may work on at once; whole vectors are quicker than a remainder."""
 
 
 @vector
 def factors(time, orders, steps, powers, scales):
-    """Powers (N,) <- t^o_r of each row; scales (4 S,) <- t^-s, s of `steps` (4 S,) at each sample."""
+    """Powers (N,) <- t^o_r of each row; scales (4 S,) <- t^-s, with s of `steps` (4 S,)."""
     for r in range(orders.size):
         powers[r] = time ** orders[r]
     first = 1.0 / time
@@ -203,7 +204,9 @@ def _accumulate(weights, scales, products, count, sums):
         for p in range(wanted):
             sums[c, p] = 0.0
         whole = scales.size // VECTOR * VECTOR
-        for i in range(0, whole, VECTOR):  # so many at once, or sums would be loaded and stored most
+        for i in range(
+            0, whole, VECTOR
+        ):  # so many at once, or sums would be loaded and stored most
             for p in range(wanted):
                 sums[c, p] += (
                     weights[0, c, i] * products[i, p]

@@ -126,14 +126,14 @@ def _norm(samples, row, limits, roots, values, r, first, slopes, bends):
     """|d|^2 / L^2, or its square or fourth root, less 1; the bend leaves out what is negative."""
     worst = 0.0
     for q in range(samples.shape[2]):
+        bends[first, q] = 2.0 / (limits[r, q] * limits[r, q])
+    for q in range(samples.shape[2]):
         x = samples[0, row, q]
         y = samples[1, row, q]
         z = samples[2, row, q]
-        values[r, q] = (x * x + y * y + z * z) / (limits[r, q] * limits[r, q])
+        values[r, q] = 0.5 * bends[first, q] * (x * x + y * y + z * z)
     for q in range(samples.shape[2]):
         worst = max(worst, values[r, q])
-    for q in range(samples.shape[2]):
-        bends[first, q] = 2.0 / (limits[r, q] * limits[r, q])
     if roots > 0:
         for q in range(samples.shape[2]):
             ratio = max(values[r, q], BENT)
@@ -148,16 +148,19 @@ def _norm(samples, row, limits, roots, values, r, first, slopes, bends):
     for x in range(samples.shape[0]):
         for q in range(samples.shape[2]):
             slopes[first, x, q] = bends[first, q] * samples[x, row, q]
-    return worst ** (0.5 / (row + 1))
+    if row == 2:
+        return np.cbrt(np.sqrt(worst))
+    return np.sqrt(worst) if row == 0 else np.sqrt(np.sqrt(np.sqrt(worst)))
 
 
 @vector
 def _norm_kappa(samples, row, limit, out):
+    inverse = 1.0 / limit
     for q in range(samples.shape[2]):
         x = samples[0, row, q]
         y = samples[1, row, q]
         z = samples[2, row, q]
-        out[q] = np.sqrt(x * x + y * y + z * z) / limit
+        out[q] = np.sqrt(x * x + y * y + z * z) * inverse
 
 
 @vector
@@ -165,16 +168,20 @@ def _thrust(samples, limits, gravity, values, r, first, slopes, bends):
     """|F|^2 / L^2 - 1; its squared stretch r solves |a|^2 + 2 g a_z r + (g^2 - L^2) r^2 = 0."""
     worst = 0.0
     for q in range(samples.shape[2]):
+        bends[first, q] = 2.0 / (limits[r, q] * limits[r, q])
+    for q in range(samples.shape[2]):
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         z = samples[2, 1, q]
-        square = limits[r, q] * limits[r, q]
-        values[r, q] = (x * x + y * y + z * z) / square - 1.0
-        bends[first, q] = 2.0 / square
+        values[r, q] = 0.5 * bends[first, q] * (x * x + y * y + z * z) - 1.0
+    for q in range(samples.shape[2]):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        z = samples[2, 1, q]
         b = gravity * (z - gravity)
-        room = square - gravity * gravity
+        room = max(limits[r, q] * limits[r, q] - gravity * gravity, 1e-3)
         own = x * x + y * y + (z - gravity) * (z - gravity)
-        slopes[first, 0, q] = (b + np.sqrt(b * b + max(room, 1e-3) * own)) / max(room, 1e-3)
+        slopes[first, 0, q] = (b + np.sqrt(b * b + room * own)) / room
     for q in range(samples.shape[2]):
         worst = max(worst, slopes[first, 0, q])
     for x in range(samples.shape[0]):
