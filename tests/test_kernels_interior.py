@@ -33,40 +33,44 @@ every_kind = pytest.mark.parametrize("kind", range(len(rows.KIND_TERMS)), ids=NA
 
 @kernel
 def call_constrain(
-    kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, figures, samples, limits, gravity, values, r, first, slopes, bends
 ):  # fmt: skip
     return rows.constrain(
-        kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes,
-        bends,
-    )  # fmt: skip
+        kind, leaning, turning, figures, samples, limits, gravity, values, r, first, slopes, bends
+    )
 
 
 @kernel
-def call_kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out):
-    rows.kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out)
+def call_kappa(kind, leaning, turning, figures, samples, limit, gravity, out):
+    rows.kappa(kind, leaning, turning, figures, samples, limit, gravity, out)
 
 
 @kernel
-def call_sample(data, orders, time, gravity, table, samples, rates):
-    pieces.sample(data, orders, time, gravity, table, samples, rates)
+def call_factors(time, orders, steps, powers, scales):
+    pieces.factors(time, orders, steps, powers, scales)
 
 
 @kernel
-def call_push(pulls, rates, orders, time, table, out):
-    return pieces.push(pulls, rates, orders, time, table, out)
+def call_sample(data, orders, steps, powers, scales, table, k, samples, rates):
+    pieces.sample(data, orders, steps, powers, scales, table, k, samples, rates)
 
 
 @kernel
-def call_pull(steps, lengthening, rates, orders, time, table, moves):
-    pieces.pull(steps, lengthening, rates, orders, time, table, moves)
+def call_push(pulls, powers, scales, rates, table, k, out):
+    return pieces.push(pulls, powers, scales, rates, table, k, out)
+
+
+@kernel
+def call_pull(steps, lengthening, powers, scales, rates, table, k, moves):
+    pieces.pull(steps, lengthening, powers, scales, rates, table, k, moves)
 
 
 @kernel
 def call_curvature(
-    weights, rates, orders, time, table, pairs, count, products, powers, sums, columns, out
+    weights, rates, k, powers, scales, table, pairs, count, products, sums, turned, columns, out
 ):
     pieces.curvature(
-        weights, rates, orders, time, table, pairs, count, products, powers, sums, columns, out
+        weights, rates, k, powers, scales, table, pairs, count, products, sums, turned, columns, out
     )
 
 
@@ -79,8 +83,8 @@ def call_band(matrix, damping, factor, values):
 
 
 @kernel
-def call_evaluate(layout, grid, limited, work, x):
-    return conditions.evaluate(layout, grid, limited, work, x)
+def call_evaluate(layout, grid, limited, work, x, moved):
+    return conditions.evaluate(layout, grid, limited, work, x, moved)
 
 
 @kernel
@@ -102,24 +106,25 @@ def call_lower(layout, grid, limited, work, x, slowly):
 def constrain(kind, samples, limits):
     """Values (S,), slopes (P, 3, S), bends (P, S) and the stretch of a kind at samples (3, 4, S).
 
-    The kind's terms do not come first, to see that they are put where they belong.
+    Neither the kind nor its terms come first, to see that they are put where they belong.
     """
     count, terms = samples.shape[2], len(rows.KIND_TERMS[kind])
-    values = np.full(count, NAN)
+    values, every = np.full((4, count), NAN), np.full((4, count), NAN)
     slopes, bends = np.full((terms + 2, 3, count), NAN), np.full((terms + 2, count), NAN)
-    limits = np.broadcast_to(limits, count).copy()
+    every[2] = limits
     stretch = call_constrain(
-        kind, LEANING, TURNING, FIGURES, samples, count, limits, GRAVITY, values, 1, slopes, bends
+        kind, LEANING, TURNING, FIGURES, samples, every, GRAVITY, values, 2, 1, slopes, bends
     )
     for array in (slopes, bends):
         assert np.isnan(array[0]).all()
         assert np.isnan(array[-1]).all()
-    return values, slopes[1:-1], bends[1:-1], stretch
+    assert np.isnan(values[[0, 1, 3]]).all()
+    return values[2], slopes[1:-1], bends[1:-1], stretch
 
 
 def kappa(kind, samples, limit):
     out = np.full(samples.shape[2], NAN)
-    call_kappa(kind, LEANING, TURNING, FIGURES, samples, samples.shape[2], limit, GRAVITY, out)
+    call_kappa(kind, LEANING, TURNING, FIGURES, samples, limit, GRAVITY, out)
     return out
 
 
@@ -356,17 +361,33 @@ def random_piece(degree, seed, samples=7):
     return rng.normal(size=(degree, 3)), float(rng.uniform(0.4, 1.6)), grid
 
 
+def factors(time, grid):
+    """What powers of the duration do to rows of end data (N,) and to samples (4 S,)."""
+    powers, scales = np.full(len(grid.orders), NAN), np.full(grid.table.shape[1], NAN)
+    call_factors(time, grid.orders, grid.steps, powers, scales)
+    return powers, scales
+
+
 def sample(data, time, grid):
-    count = grid.table.shape[2]
-    samples, rates = (np.full((3, 4, count), NAN) for _ in range(2))
-    call_sample(data, grid.orders, time, GRAVITY, grid.table, samples, rates)
-    return samples, rates
+    """Samples, without gravity, and rates (3, 4, S).
+
+    The piece does not come first, to see that they are put where they belong.
+    """
+    samples, rates = (np.full((3, 3, grid.table.shape[1]), NAN) for _ in range(2))
+    call_sample(
+        data.copy(), grid.orders, grid.steps, *factors(time, grid), grid.table, 1, samples, rates
+    )
+    for array in (samples, rates):
+        assert np.isnan(array[[0, 2]]).all()
+    return samples[1].reshape(3, 4, -1), rates[1].reshape(3, 4, -1)
 
 
 def pull(steps, lengthening, rates, time, grid):
-    moves = np.full(rates.shape, NAN)
-    call_pull(steps, lengthening, rates, grid.orders, time, grid.table, moves)
-    return moves
+    moves = np.full((1, 3, grid.table.shape[1]), NAN)
+    call_pull(
+        steps, lengthening, *factors(time, grid), rates.reshape(1, 3, -1), grid.table, 0, moves
+    )
+    return moves.reshape(rates.shape)
 
 
 def trajectory_of(data, starts, times):
@@ -399,8 +420,7 @@ def test_samples_are_derivatives_of_the_trajectory(degree):
     u = (1.0 - np.cos(np.pi * np.arange(7) / 6)) / 2.0
     for order in range(1, 5):
         expected = trajectory.at(0, u * time, order)
-        expected[:, 2] += GRAVITY * (order == 2)
-        size = sizes.at(0, u * time, order) + GRAVITY * (order == 2)
+        size = sizes.at(0, u * time, order)
         assert (np.abs(samples[:, order - 1].T - expected) <= 1e-14 * size).all()
 
 
@@ -438,7 +458,10 @@ def test_push_is_the_transpose_of_pull(degree):
     pulls = rng.normal(size=rates.shape)
     moves = pull(steps, lengthening, rates, time, grid)
     carried = np.full(data.shape, NAN)
-    along = call_push(pulls.copy(), rates, grid.orders, time, grid.table, carried)
+    along = call_push(
+        pulls.reshape(1, 3, -1).copy(), *factors(time, grid), rates.reshape(1, 3, -1),
+        grid.table, 0, carried,
+    )  # fmt: skip
     size = (np.abs(pulls) * np.abs(moves)).sum()
     assert (carried * steps).sum() + along * lengthening == pytest.approx(
         (pulls * moves).sum(), rel=0, abs=1e-12 * size
@@ -462,8 +485,9 @@ def test_curvature_is_the_dense_product(degree, steps):
     out = np.zeros((size, size))
     wanted = len(grid.pairs) if steps else int(grid.still[0])
     call_curvature(
-        six, rates, grid.orders, time, grid.table, grid.pairs, wanted, grid.products,
-        np.empty(degree), np.empty((6, len(grid.pairs))), np.empty(3 * degree), out,
+        six.transpose(1, 0, 2).reshape(1, 6, -1), rates.reshape(1, 3, -1), 0, *factors(time, grid),
+        grid.table, grid.pairs, wanted, grid.products, np.empty((6, grid.products.shape[1])),
+        np.empty((1, 3, grid.table.shape[1])), np.empty((degree, 3)), out,
     )  # fmt: skip
     filled = np.zeros((size, size), dtype=bool)
     for i in range(degree):
@@ -524,11 +548,12 @@ def test_an_indefinite_band_is_refused(width):
     matrix[:, 0] = 0.1
     assert np.linalg.eigvalsh(dense_of(matrix))[0] < 0.0
     values = np.ones(12)
-    assert not call_band(matrix, 0.0, np.empty_like(matrix), values)
-    assert call_band(matrix, 1e4, np.empty_like(matrix), values)
+    factor = np.empty_like(matrix)
+    assert not call_band(matrix, 0.0, factor, values)
+    assert call_band(matrix, 1e4, factor, values)
     matrix[:, 0] = 50.0
     matrix[7, 0] = NAN
-    assert not call_band(matrix, 0.0, np.empty_like(matrix), values)
+    assert not call_band(matrix, 0.0, factor, values)
 
 
 def test_a_singular_band_is_refused():
@@ -717,7 +742,7 @@ class Case:
         self.work.stiffness[:] = self.rng.uniform(0.0, 20.0, size=shape[0])
 
     def evaluate(self, x):
-        return call_evaluate(self.layout, self.grid, self.limited, self.work, x)
+        return call_evaluate(self.layout, self.grid, self.limited, self.work, x, True)
 
     def values(self, x):
         self.evaluate(x)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from peakflight.kernels import pieces, rows
-from peakflight.kernels.jit import inner, within
+from peakflight.kernels.jit import inner, vector, within
 
 LEAST = 5
 """The kind that is limited from below."""
@@ -50,15 +50,19 @@ class Grid(NamedTuple):
     orders: np.ndarray
     """(N,) int: derivative in each row of the end data."""
     table: np.ndarray
-    """(N, 4, S) at the samples."""
+    """(N, 4 S) at the samples."""
     dense: np.ndarray
-    """(N, 4, S C) at C even points of each sample's cell, one after the other."""
+    """(N, 4 C S) at C even points of each sample's cell: the first of all cells, the second, .."""
     pairs: np.ndarray
     """(P, 2) int: rows i <= j, those without the step first."""
     still: np.ndarray
     """(1,) int: how many of them are without the step."""
     products: np.ndarray
-    """(4, S, P) of table rows."""
+    """(4 S, P or more) of table rows; zeros fill up the last vector: see `pieces.VECTOR`."""
+    steps: np.ndarray
+    """(4 S,) derivative, 1 to 4, in each column of the table."""
+    dense_steps: np.ndarray
+    """(4 C S,) likewise."""
     quadrature: np.ndarray
     """(S,) weights on the unit interval."""
 
@@ -101,7 +105,7 @@ class Work(NamedTuple):
     samples: np.ndarray
     """(K, 3, 4, S), with gravity."""
     rates: np.ndarray
-    """(K, 3, 4, S) by log time."""
+    """(K, 3, 4 S) by log time."""
     values: np.ndarray
     """(K, R, S) constraints c."""
     slopes: np.ndarray
@@ -125,13 +129,16 @@ class Work(NamedTuple):
 
 
 @inner
-def evaluate(layout, grid, limited, work, x):
+def evaluate(layout, grid, limited, work, x, moved):
     """Samples and constraints at x; returns the stretch that they need, total time and effort.
 
+    moved: False if only limits have changed since the last call.
     work.marks[LOST] <- the time that pieces would lose if each were stretched for itself.
     """
-    count = grid.table.shape[2]
     data = np.empty((grid.orders.size, 3))
+    powers = np.empty(grid.orders.size)
+    scales = np.empty(grid.table.shape[1])
+    samples = work.samples.reshape(work.rates.shape)
     needed = limited.least[0]
     lost = 0.0
     total = 0.0
@@ -139,53 +146,71 @@ def evaluate(layout, grid, limited, work, x):
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
         total += time
-        pieces.end_data(layout.place, layout.known, x, k, data)
-        pieces.sample(
-            data, grid.orders, time, limited.gravity[0], grid.table, work.samples[k], work.rates[k]
-        )
-        own = limited.least[0]
-        for r in range(limited.kinds.size):
-            own = max(
-                own,
-                rows.constrain(
-                    limited.kinds[r], limited.leaning, limited.turning, limited.figures,
-                    work.samples[k], count, work.limits[k, r], limited.gravity[0],
-                    work.values[k, r], limited.first[r], work.slopes[k], work.bends[k],
-                ),
-            )  # fmt: skip
+        if moved:
+            pieces.factors(time, grid.orders, grid.steps, powers, scales)
+            pieces.end_data(layout.place, layout.known, x, k, data)
+            pieces.sample(
+                data, grid.orders, grid.steps, powers, scales, grid.table, k, samples, work.rates
+            )
+            _add_gravity(limited.gravity[0], k, work.samples)
+        own = max(limited.least[0], _constrain(limited, work, k))
         needed = max(needed, own)
         lost += time * max(own - 1.0, 0.0)
-        effort += _effort(limited.effort, grid, limited, work.samples[k], time)
+        effort += _effort(limited.effort, grid, limited, work, k, time)
     work.marks[LOST] = lost
     return needed, total, effort
 
 
 @inner
-def _effort(effort, grid, limited, samples, time):
+def _add_gravity(gravity, k, samples):
+    for q in range(samples.shape[3]):
+        samples[k, 2, 1, q] += gravity
+
+
+@within
+def _constrain(limited, work, k):
+    """Constraints of a piece; returns the stretch that they need."""
+    samples = work.samples[k]
+    limits = work.limits[k]
+    values = work.values[k]
+    slopes = work.slopes[k]
+    bends = work.bends[k]
+    needed = 0.0
+    for r in range(limited.kinds.size):
+        stretch = rows.constrain(
+            limited.kinds[r], limited.leaning, limited.turning, limited.figures, samples, limits,
+            limited.gravity[0], values, r, limited.first[r], slopes, bends,
+        )  # fmt: skip
+        needed = max(needed, stretch)
+    return needed
+
+
+@inner
+def _effort(effort, grid, limited, work, k, time):
     """What a piece adds to the weighed integrals of squared derivatives."""
     total = 0.0
     if effort is None:
         return total
-    for s in range(4):
+    for s in range(effort.size):
         for q in range(grid.quadrature.size):
-            for d in range(3):
-                value = _without_gravity(samples[d, s, q], d, s, limited)
+            for d in range(work.samples.shape[1]):
+                value = _without_gravity(work.samples[k, d, s, q], d, s, limited)
                 total += effort[s] * grid.quadrature[q] * time * value * value
     return total
 
 
 @inner
-def _pull_effort(effort, grid, limited, samples, time, sums):
-    """Sums (3, 4, S) += slope of a piece's effort by its samples; returns its own by log time."""
+def _pull_effort(effort, grid, limited, work, k, time, sums):
+    """Sums (1, 3, 4, S) += slope of a piece's effort by samples; returns its own by log time."""
     direct = 0.0
     if effort is None:
         return direct
-    for s in range(4):
-        for d in range(3):
+    for s in range(effort.size):
+        for d in range(work.samples.shape[1]):
             for q in range(grid.quadrature.size):
-                value = _without_gravity(samples[d, s, q], d, s, limited)
+                value = _without_gravity(work.samples[k, d, s, q], d, s, limited)
                 weight = effort[s] * grid.quadrature[q] * time
-                sums[d, s, q] += 2.0 * weight * value
+                sums[0, d, s, q] += 2.0 * weight * value
                 direct += weight * value * value
     return direct
 
@@ -199,20 +224,26 @@ def _without_gravity(value, d, s, limited):
 def gradient(layout, grid, limited, work, x, flat_pulls, out):
     """Out (n,) <- gradient of the objective, and of the constraints times pulls (K R S,)."""
     pulls = flat_pulls.reshape(work.values.shape)
-    count = grid.table.shape[2]
-    sums = np.empty((3, 4, count))
+    powers = np.empty(grid.orders.size)
+    scales = np.empty(grid.table.shape[1])
+    sums = np.empty((1, 3, 4, pulls.shape[2]))
+    flat_sums = sums.reshape((1, 3, grid.table.shape[1]))
     local = np.empty((grid.orders.size, 3))
     for i in range(out.size):
         out[i] = 0.0
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
-        sums[:] = 0.0
+        pieces.factors(time, grid.orders, grid.steps, powers, scales)
+        flat_sums[:] = 0.0
         for r in range(limited.kinds.size):
             for p in range(limited.first[r], limited.first[r + 1]):
-                _add_pull(pulls[k, r], work.slopes[k, p], limited.orders[p], sums)
-        direct = time + _pull_effort(limited.effort, grid, limited, work.samples[k], time, sums)
-        along = pieces.push(sums, work.rates[k], grid.orders, time, grid.table, local)
-        out[layout.clock[k]] += direct + along
+                _add_pull(pulls, k, r, work.slopes, p, limited.orders[p], sums)
+        out[layout.clock[k]] += time + _pull_effort(
+            limited.effort, grid, limited, work, k, time, sums
+        )
+        out[layout.clock[k]] += pieces.push(
+            flat_sums, powers, scales, work.rates, grid.table, k, local
+        )
         for r in range(grid.orders.size):
             for d in range(3):
                 if layout.place[k, r, d] >= 0:
@@ -222,196 +253,227 @@ def gradient(layout, grid, limited, work, x, flat_pulls, out):
                 out[layout.place[k, grid.orders.size, d]] -= local[0, d]
 
 
-@inner
-def _add_pull(pulls, slope, order, sums):
-    for d in range(3):
-        for q in range(pulls.size):
-            sums[d, order, q] += pulls[q] * slope[d, q]
+@vector
+def _add_pull(pulls, k, r, slopes, p, order, sums):
+    for d in range(sums.shape[1]):
+        for q in range(sums.shape[3]):
+            sums[0, d, order, q] += pulls[k, r, q] * slopes[k, p, d, q]
 
 
 @within
 def product(layout, grid, limited, work, x, step, flat):
     """Flat (K R S,) <- gradients of the constraints times a step (n,)."""
     out = flat.reshape(work.values.shape)
-    count = grid.table.shape[2]
-    moves = np.empty((3, 4, count))
+    powers = np.empty(grid.orders.size)
+    scales = np.empty(grid.table.shape[1])
+    moves = np.empty((1, 3, 4, out.shape[2]))
+    flat_moves = moves.reshape((1, 3, grid.table.shape[1]))
     local = np.empty((grid.orders.size, 3))
-    nothing = np.zeros(layout.known.shape)
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
-        pieces.end_data(layout.place, nothing, step, k, local)
+        pieces.factors(time, grid.orders, grid.steps, powers, scales)
+        pieces.step_data(layout.place, step, k, local)
         pieces.pull(
-            local, step[layout.clock[k]], work.rates[k], grid.orders, time, grid.table, moves
+            local, step[layout.clock[k]], powers, scales, work.rates, grid.table, k, flat_moves
         )
         for r in range(limited.kinds.size):
-            for q in range(count):
+            for q in range(out.shape[2]):
                 out[k, r, q] = 0.0
             for p in range(limited.first[r], limited.first[r + 1]):
-                _add_move(moves, work.slopes[k, p], limited.orders[p], out[k, r])
+                _add_move(moves, work.slopes, k, p, limited.orders[p], r, out)
 
 
-@inner
-def _add_move(moves, slope, order, out):
-    for d in range(3):
-        for q in range(out.size):
-            out[q] += moves[d, order, q] * slope[d, q]
+@vector
+def _add_move(moves, slopes, k, p, order, r, out):
+    for q in range(out.shape[2]):
+        out[k, r, q] += (
+            moves[0, 0, order, q] * slopes[k, p, 0, q]
+            + moves[0, 1, order, q] * slopes[k, p, 1, q]
+            + moves[0, 2, order, q] * slopes[k, p, 2, q]
+        )
 
 
 @within
 def assemble(layout, grid, limited, work, x):
     """The matrix H in band storage."""
-    count, rows_ = grid.table.shape[2], grid.orders.size
-    weights = np.empty((4, 6, count))
-    local = np.empty((3 * rows_ + 1, 3 * rows_ + 1))
-    powers = np.empty(rows_)
-    sums = np.empty((6, grid.pairs.shape[0]))
-    columns = np.empty(3 * rows_)
+    last = 3 * grid.orders.size
+    powers = np.empty(grid.orders.size)
+    scales = np.empty(grid.table.shape[1])
+    weights = np.empty((1, 6, 4, grid.quadrature.size))
+    flat_weights = weights.reshape((1, 6, grid.table.shape[1]))
+    turned = np.empty((1, 3, grid.table.shape[1]))
+    sums = np.empty((6, grid.products.shape[1]))
+    columns = np.empty((grid.orders.size, 3))
+    local = np.empty((last + 1, last + 1))
     work.matrix[:] = 0.0
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
+        pieces.factors(time, grid.orders, grid.steps, powers, scales)
         local[:] = 0.0
-        weights[:] = 0.0
+        flat_weights[:] = 0.0
         for r in range(limited.kinds.size):
             single = limited.first[r + 1] == limited.first[r] + 1
             for p in range(limited.first[r], limited.first[r + 1]):
                 _add_weights(
-                    work.dual[k, r], work.slack[k, r], work.bends[k, p], work.slopes[k, p], single,
-                    weights[limited.orders[p]],
+                    work.dual, work.slack, work.bends, work.slopes, k, r, p, single,
+                    limited.orders[p], weights,
                 )  # fmt: skip
         wanted = grid.pairs.shape[0] if layout.steps[k] else grid.still[0]
         pieces.curvature(
-            weights, work.rates[k], grid.orders, time, grid.table, grid.pairs, wanted,
-            grid.products, powers, sums, columns, local,
+            flat_weights, work.rates, k, powers, scales, grid.table, grid.pairs, wanted,
+            grid.products, sums, turned, columns, local,
         )  # fmt: skip
-        local[3 * rows_, 3 * rows_] += time * (1.0 + work.stiffness[k])
-        _add_outer(limited.several, grid, limited, work, k, time, local)
+        local[last, last] += time * (1.0 + work.stiffness[k])
+        _add_outer(limited.several, grid, limited, work, k, powers, scales, local)
         _add_effort(
-            limited.effort, grid, limited, work, k, time, weights, powers, sums, columns, local
-        )
+            limited.effort, grid, limited, work, k, time, powers, scales, weights, flat_weights,
+            sums, turned, columns, local,
+        )  # fmt: skip
         _scatter(layout, k, local, work.matrix)
 
 
-@inner
-def _add_weights(dual, slack, bend, slope, single, weights):
-    """Weights (6, S) += z bend I, and z/s times the slope's outer product if it is the only one."""
-    for q in range(dual.size):
-        isotropic = dual[q] * bend[q]
-        weights[0, q] += isotropic
-        weights[3, q] += isotropic
-        weights[5, q] += isotropic
-    if single:
-        for q in range(dual.size):
-            ratio = dual[q] / slack[q]
-            x = slope[0, q]
-            y = slope[1, q]
-            z = slope[2, q]
-            weights[0, q] += ratio * x * x
-            weights[1, q] += ratio * x * y
-            weights[2, q] += ratio * x * z
-            weights[3, q] += ratio * y * y
-            weights[4, q] += ratio * y * z
-            weights[5, q] += ratio * z * z
+@vector
+def _add_weights(dual, slack, bends, slopes, k, r, p, single, order, weights):
+    """Weights (1, 6, 4, S) += z bend I, and z/s times the slope's outer product if it is the only.
+
+    Of one derivative.
+    """
+    for q in range(dual.shape[2]):
+        bend = dual[k, r, q] * bends[k, p, q]
+        ratio = dual[k, r, q] / slack[k, r, q] if single else 0.0
+        x = slopes[k, p, 0, q]
+        y = slopes[k, p, 1, q]
+        z = slopes[k, p, 2, q]
+        weights[0, 0, order, q] += bend + ratio * x * x
+        weights[0, 1, order, q] += ratio * x * y
+        weights[0, 2, order, q] += ratio * x * z
+        weights[0, 3, order, q] += bend + ratio * y * y
+        weights[0, 4, order, q] += ratio * y * z
+        weights[0, 5, order, q] += bend + ratio * z * z
 
 
 @inner
-def _add_outer(several, grid, limited, work, k, time, local):
+def _add_outer(several, grid, limited, work, k, powers, scales, local):
     """Local += z/s times the outer products of gradients in several derivatives at once."""
     if several is None:
         return
     size = 3 * grid.orders.size
+    count = grid.quadrature.size
     column = np.empty(size + 1)
     for r in range(limited.kinds.size):
         if limited.first[r + 1] == limited.first[r] + 1:
             continue
-        for q in range(grid.table.shape[2]):
+        for q in range(count):
             ratio = work.dual[k, r, q] / work.slack[k, r, q]
             for c in range(size + 1):
                 column[c] = 0.0
             for p in range(limited.first[r], limited.first[r + 1]):
-                s = limited.orders[p]
-                for d in range(3):
+                i = limited.orders[p] * count + q
+                for d in range(work.slopes.shape[2]):
                     slope = work.slopes[k, p, d, q]
-                    column[size] += slope * work.rates[k, d, s, q]
+                    column[size] += slope * work.rates[k, d, i]
                     for row in range(grid.orders.size):
-                        column[3 * row + d] += (
-                            slope * grid.table[row, s, q] * time ** (grid.orders[row] - s - 1)
-                        )
+                        column[3 * row + d] += slope * grid.table[row, i] * powers[row] * scales[i]
             for i in range(size + 1):
                 scaled = ratio * column[i]
-                for j in range(i - i % 3, size + 1):
+                for j in range(i, size + 1):
                     local[i, j] += scaled * column[j]
 
 
 @inner
-def _add_effort(effort, grid, limited, work, k, time, weights, powers, sums, columns, local):
+def _add_effort(
+    effort, grid, limited, work, k, time, powers, scales, weights, flat_weights, sums, turned,
+    columns, local,
+):  # fmt: skip
     """Local += Gauss-Newton matrix of the effort: residuals sqrt(t) d, so rates are d/2 more."""
     if effort is None:
         return
-    rates = np.empty((3, 4, grid.quadrature.size))
-    weights[:] = 0.0
-    for s in range(4):
-        for q in range(grid.quadrature.size):
+    count = grid.quadrature.size
+    rates = np.empty((1, 3, scales.size))
+    first = np.int64(0)
+    flat_weights[:] = 0.0
+    for s in range(effort.size):
+        for q in range(count):
+            i = s * count + q
             weight = 2.0 * effort[s] * grid.quadrature[q] * time
-            weights[s, 0, q] = weight
-            weights[s, 3, q] = weight
-            weights[s, 5, q] = weight
-        for d in range(3):
-            for q in range(grid.quadrature.size):
+            for d in range(3):
                 value = _without_gravity(work.samples[k, d, s, q], d, s, limited)
-                rates[d, s, q] = work.rates[k, d, s, q] + 0.5 * value
+                rates[first, d, i] = work.rates[k, d, i] + 0.5 * value
+                weights[first, pieces.SIX[d][d], s, q] = weight
     pieces.curvature(
-        weights, rates, grid.orders, time, grid.table, grid.pairs, grid.pairs.shape[0],
-        grid.products, powers, sums, columns, local,
+        flat_weights, rates, first, powers, scales, grid.table, grid.pairs, grid.pairs.shape[0],
+        grid.products, sums, turned, columns, local,
     )  # fmt: skip
 
 
 @within
 def _scatter(layout, k, local, matrix):
-    """Add the local matrix of a piece to the band."""
+    """Add the local matrix of a piece, whose upper half is filled, to the band."""
     for a in range(layout.size[k]):
         row = layout.unknown[k, a]
         i = layout.source[k, a]
         for b in range(a, layout.size[k]):
             j = layout.source[k, b]
-            value = local[i, j] if i // 3 <= j // 3 else local[j, i]
-            matrix[row, layout.unknown[k, b] - row] += layout.sign[k, a] * layout.sign[k, b] * value
+            matrix[row, layout.unknown[k, b] - row] += (
+                layout.sign[k, a] * layout.sign[k, b] * local[min(i, j), max(i, j)]
+            )
 
 
 @within
 def lower(layout, grid, limited, work, x, slowly):
     """Lower the limit of each sample by how much more than the sample its cell reaches."""
-    count = grid.table.shape[2]
-    cells = grid.dense.shape[2] // count
+    count = grid.quadrature.size
+    many = grid.dense.shape[1] // 4
+    first = np.int64(0)
     data = np.empty((grid.orders.size, 3))
-    near = np.empty((3, 4, count * cells))
-    rates = np.empty((3, 4, count * cells))
-    around = np.empty(count * cells)
+    powers = np.empty(grid.orders.size)
+    scales = np.empty(grid.dense.shape[1])
+    near = np.empty((1, 3, 4, many))
+    flat = near.reshape((1, 3, grid.dense.shape[1]))
+    around = np.empty(many)
+    peak = np.empty(count)
     there = np.empty(count)
     for k in range(layout.clock.size):
         time = np.exp(x[layout.clock[k]])
+        pieces.factors(time, grid.orders, grid.dense_steps, powers, scales)
         pieces.end_data(layout.place, layout.known, x, k, data)
-        pieces.sample(data, grid.orders, time, limited.gravity[0], grid.dense, near, rates)
+        pieces.derive(data, powers, scales, grid.dense, first, flat)
+        _add_gravity(limited.gravity[0], first, near)
+        samples = work.samples[k]
         for r in range(limited.kinds.size):
             kind, limit = limited.kinds[r], limited.values[r]
             rows.kappa(
-                kind, limited.leaning, limited.turning, limited.figures, near, count * cells, limit,
+                kind, limited.leaning, limited.turning, limited.figures, near[first], limit,
                 limited.gravity[0], around,
             )  # fmt: skip
             rows.kappa(
-                kind, limited.leaning, limited.turning, limited.figures, work.samples[k], count,
-                limit, limited.gravity[0], there,
+                kind, limited.leaning, limited.turning, limited.figures, samples, limit,
+                limited.gravity[0], there,
             )  # fmt: skip
+            _peaks(around, peak)
             for q in range(count):
-                peak = 1e-300
-                for c in range(cells):
-                    value = around[q * cells + c]
-                    if 0 < c < cells - 1:  # a parabola through an inner maximum
-                        left = around[q * cells + c - 1]
-                        right = around[q * cells + c + 1]
-                        curve = 2.0 * value - left - right
-                        if value >= left and value >= right and curve > 0.0:
-                            value += (right - left) ** 2 / (8.0 * curve)
-                    peak = max(peak, value)
-                ratio = min(max(there[q] / peak, DEEPEST), 1.0)
+                ratio = min(max(there[q] / peak[q], DEEPEST), 1.0)
                 lowered = limit / ratio if kind == LEAST else limit * ratio
                 work.limits[k, r, q] += slowly * (lowered - work.limits[k, r, q])
+
+
+@vector
+def _peaks(around, peak):
+    """Peak (S,) <- the largest around each sample, of C values (C S,) or of parabolas through them.
+
+    A parabola goes through an inner maximum and its neighbours.
+    """
+    count = peak.size
+    for q in range(count):
+        peak[q] = 1e-300
+    for i in range(0, around.size, count):
+        for q in range(count):
+            peak[q] = max(peak[q], around[i + q])
+    for i in range(count, around.size - count, count):
+        for q in range(count):
+            left = around[i + q - count]
+            value = around[i + q]
+            right = around[i + q + count]
+            curve = max(2.0 * value - left - right, 1e-300)
+            vertex = value + (right - left) * (right - left) / (8.0 * curve)
+            peak[q] = max(peak[q], vertex if value >= left and value >= right else value)

@@ -106,6 +106,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
     trial = np.empty_like(x)
     step = np.empty_like(x)
     count = values.size
+    moved, stays = np.bool_(True), np.bool_(False)  # literals would compile `evaluate` twice
     whole = not layout.steps.any()
     objective = time * needed + effort
     for _ in range(iterations):
@@ -146,7 +147,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
                     trial[i] = x[i] - np.log(1.0 + primal * step[i])
                 else:
                     trial[i] = x[i] - primal * step[i]
-            needed, time, effort = conditions.evaluate(layout, grid, limited, work, trial)
+            needed, time, effort = conditions.evaluate(layout, grid, limited, work, trial, moved)
             objective = time * needed + effort
             after = _residual_after(values, slack, slack_step, primal)
             if objective <= TOLERATED * previous or after <= TOLERATED * before:
@@ -159,7 +160,7 @@ def run(layout, grid, limited, work, anew, begin, tolerance, iterations):
         marks[COUNT] += 1.0
         if marks[GAP] < NEARNESS:
             conditions.lower(layout, grid, limited, work, x, begin.slowly)
-            needed, time, effort = conditions.evaluate(layout, grid, limited, work, x)
+            needed, time, effort = conditions.evaluate(layout, grid, limited, work, x, stays)
             objective = time * needed + effort
             if marks[LOWERED] == 0.0:
                 marks[LOWERED] = 1.0
@@ -207,8 +208,9 @@ def _begin(layout, grid, limited, work, anew, begin):
                 for q in range(work.limits.shape[2]):
                     work.limits[k, r, q] = limited.values[r]
     needed, time, effort = 0.0, 0.0, 0.0
+    moved = np.bool_(True)
     for attempt in range(STRETCHES + 1):
-        needed, time, effort = conditions.evaluate(layout, grid, limited, work, work.x)
+        needed, time, effort = conditions.evaluate(layout, grid, limited, work, work.x, moved)
         factor = max(needed * begin.margin, 1e-3)
         enough = begin.margin == 0.0 or attempt == STRETCHES or abs(factor - 1.0) < EXACT
         if enough or not anew:

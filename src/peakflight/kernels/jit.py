@@ -1,5 +1,6 @@
 """How kernels are compiled, and where the result is kept."""
 
+import gc
 import hashlib
 import logging
 import os
@@ -69,7 +70,7 @@ def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 _INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-kernel = _compiled(nogil=True)
+kernel = _compiled(nogil=True, no_cfunc_wrapper=True)
 """Decorator of every kernel that Python calls; other threads run meanwhile."""
 inner = _compiled(**_INNER)
 """Decorator of kernels that only kernels call: no entry point from Python, less to compile."""
@@ -92,9 +93,12 @@ def announced(name: str, log: logging.Logger) -> Iterator[None]:
     if name in _ready or _config.DISABLE_JIT:
         yield
         return
-    if not is_ready(name):
+    if is_ready(name):
+        yield
+    else:
         log.warning("compiling the planner for this machine, once; this takes some seconds")
-    yield
+        with _uncollected():
+            yield
     _mark(name).touch()
     _ready.add(name)
 
@@ -106,6 +110,20 @@ def is_ready(name: str) -> bool:
 
 def _mark(name: str) -> Path:
     return Path(FOLDER) / f"{name}.ready"
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without collection of cyclic garbage: the compiler makes millions of objects, of which little
+    is garbage, and looking for it takes a tenth of its time.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def fresh(array: ArrayLike) -> np.ndarray:

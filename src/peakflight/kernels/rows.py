@@ -48,184 +48,190 @@ WEIGHTLESS = 1e-8
 
 @inner
 def constrain(
-    kind, leaning, turning, figures, samples, count, limits, gravity, values, first, slopes, bends
+    kind, leaning, turning, figures, samples, limits, gravity, values, r, first, slopes, bends
 ):
     """Values, slopes and bends of a kind at the samples of a piece; returns the stretch they need.
 
-    samples (3, 4, S): axes, derivatives, samples; limits, values (S,); slopes (P, 3, S) and
-    bends (P, S) hold the terms of this kind from `first` on, in the order of `KIND_TERMS`; leaning,
-    turning, figures (3,) of `kernels.rotors`: None if no kind of theirs is limited.
+    samples (3, 4, S): axes, derivatives, samples; limits, values (R, S) of kinds, this one's in row
+    r; slopes (P, 3, S) and bends (P, S) hold the terms of this kind from `first` on, in the order
+    of `KIND_TERMS`; leaning, turning, figures (3,) of `kernels.rotors`: None if no kind of
+    theirs is limited.
     """
-    slope = slopes[first]
-    bend = bends[first]
     if kind == 1:
-        return _thrust(samples, count, limits, gravity, values, slope, bend)
+        return _thrust(samples, limits, gravity, values, r, first, slopes, bends)
     if kind < 4:
-        return _norm(samples, kind, count, limits, ROOTS[kind], values, slope, bend)
+        return _norm(samples, kind, limits, ROOTS[kind], values, r, first, slopes, bends)
     if kind < 6:
-        return _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend)
+        return _lean(leaning, kind, samples, limits, gravity, values, r, first, slopes, bends)
     if kind < ROTORS:
-        return _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends)
-    return _rotors(figures, kind, samples, count, limits, gravity, values, first, slopes, bends)
+        return _turn(turning, kind, samples, limits, gravity, values, r, first, slopes, bends)
+    return _rotors(figures, kind, samples, limits, gravity, values, r, first, slopes, bends)
 
 
 @inner
-def _lean(leaning, kind, samples, count, limits, gravity, values, slope, bend):
+def _lean(leaning, kind, samples, limits, gravity, values, r, first, slopes, bends):
     """Tilt and least thrust; not compiled where neither is set."""
     if leaning is None:
         return 0.0
     if kind == 4:
-        return _tilt(samples, count, limits, gravity, values, slope, bend)
-    return _least_thrust(samples, count, limits, gravity, values, slope, bend)
+        return _tilt(samples, limits, gravity, values, r, first, slopes, bends)
+    return _least_thrust(samples, limits, gravity, values, r, first, slopes, bends)
 
 
 @inner
-def _turn(turning, kind, samples, count, limits, gravity, values, first, slopes, bends):
+def _turn(turning, kind, samples, limits, gravity, values, r, first, slopes, bends):
     """Kinds about how the thrust direction turns; not compiled where none is set."""
     if turning is None:
         return 0.0
     if kind == 6:
-        return _body_rate(samples, count, limits, gravity, values, first, slopes, bends)
-    return _angular_acceleration(samples, count, limits, gravity, values, first, slopes, bends)
+        return _body_rate(samples, limits, gravity, values, r, first, slopes, bends)
+    return _angular_acceleration(samples, limits, gravity, values, r, first, slopes, bends)
 
 
 @inner
-def kappa(kind, leaning, turning, figures, samples, count, limit, gravity, out):
+def kappa(kind, leaning, turning, figures, samples, limit, gravity, out):
     """Out (S,) <- peak over limit of each sample (Eq. kapp_i, Eq. kappa2)."""
     if kind < 4:
-        _norm_kappa(samples, kind, count, limit, out)
+        _norm_kappa(samples, kind, limit, out)
     elif kind < 6:
-        _lean_kappa(leaning, kind, samples, count, limit, out)
+        _lean_kappa(leaning, kind, samples, limit, out)
     elif kind < ROTORS:
-        _turn_kappa(turning, kind, samples, count, limit, gravity, out)
+        _turn_kappa(turning, kind, samples, limit, gravity, out)
     else:
-        _rotors_kappa(figures, kind, samples, count, limit, gravity, out)
+        _rotors_kappa(figures, kind, samples, limit, gravity, out)
 
 
 @inner
-def _lean_kappa(leaning, kind, samples, count, limit, out):
+def _lean_kappa(leaning, kind, samples, limit, out):
     if leaning is None:
         return
     if kind == 4:
-        _tilt_kappa(samples, count, limit, out)
+        _tilt_kappa(samples, limit, out)
     else:
-        _least_thrust_kappa(samples, count, limit, out)
+        _least_thrust_kappa(samples, limit, out)
 
 
 @inner
-def _turn_kappa(turning, kind, samples, count, limit, gravity, out):
+def _turn_kappa(turning, kind, samples, limit, gravity, out):
     if turning is None:
         return
     if kind == 6:
-        _body_rate_kappa(samples, count, limit, gravity, out)
+        _body_rate_kappa(samples, limit, gravity, out)
     else:
-        _angular_acceleration_kappa(samples, count, limit, gravity, out)
+        _angular_acceleration_kappa(samples, limit, gravity, out)
 
 
 @vector
-def _norm(samples, row, count, limits, roots, values, slope, bend):
+def _norm(samples, row, limits, roots, values, r, first, slopes, bends):
     """|d|^2 / L^2, or its square or fourth root, less 1; the bend leaves out what is negative."""
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
+        bends[first, q] = 2.0 / (limits[r, q] * limits[r, q])
+    for q in range(samples.shape[2]):
         x = samples[0, row, q]
         y = samples[1, row, q]
         z = samples[2, row, q]
-        values[q] = (x * x + y * y + z * z) / (limits[q] * limits[q])
-    for q in range(count):
-        worst = max(worst, values[q])
-    for q in range(count):
-        bend[q] = 2.0 / (limits[q] * limits[q])
+        values[r, q] = 0.5 * bends[first, q] * (x * x + y * y + z * z)
+    for q in range(samples.shape[2]):
+        worst = max(worst, values[r, q])
     if roots > 0:
-        for q in range(count):
-            ratio = max(values[q], BENT)
+        for q in range(samples.shape[2]):
+            ratio = max(values[r, q], BENT)
             raised = np.sqrt(ratio)
             if roots > 1:
                 raised = np.sqrt(raised)
             steep = raised / (ratio * 2**roots)
-            bend[q] *= steep
-            values[q] = raised + steep * (values[q] - ratio)
-    for q in range(count):
-        values[q] -= 1.0
-    for x in range(3):
-        for q in range(count):
-            slope[x, q] = bend[q] * samples[x, row, q]
-    return worst ** (0.5 / (row + 1))
+            bends[first, q] *= steep
+            values[r, q] = raised + steep * (values[r, q] - ratio)
+    for q in range(samples.shape[2]):
+        values[r, q] -= 1.0
+    for x in range(samples.shape[0]):
+        for q in range(samples.shape[2]):
+            slopes[first, x, q] = bends[first, q] * samples[x, row, q]
+    if row == 2:
+        return np.cbrt(np.sqrt(worst))
+    return np.sqrt(worst) if row == 0 else np.sqrt(np.sqrt(np.sqrt(worst)))
 
 
 @vector
-def _norm_kappa(samples, row, count, limit, out):
-    for q in range(count):
+def _norm_kappa(samples, row, limit, out):
+    inverse = 1.0 / limit
+    for q in range(samples.shape[2]):
         x = samples[0, row, q]
         y = samples[1, row, q]
         z = samples[2, row, q]
-        out[q] = np.sqrt(x * x + y * y + z * z) / limit
+        out[q] = np.sqrt(x * x + y * y + z * z) * inverse
 
 
 @vector
-def _thrust(samples, count, limits, gravity, values, slope, bend):
+def _thrust(samples, limits, gravity, values, r, first, slopes, bends):
     """|F|^2 / L^2 - 1; its squared stretch r solves |a|^2 + 2 g a_z r + (g^2 - L^2) r^2 = 0."""
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
+        bends[first, q] = 2.0 / (limits[r, q] * limits[r, q])
+    for q in range(samples.shape[2]):
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         z = samples[2, 1, q]
-        square = limits[q] * limits[q]
-        values[q] = (x * x + y * y + z * z) / square - 1.0
-        bend[q] = 2.0 / square
+        values[r, q] = 0.5 * bends[first, q] * (x * x + y * y + z * z) - 1.0
+    for q in range(samples.shape[2]):
+        x = samples[0, 1, q]
+        y = samples[1, 1, q]
+        z = samples[2, 1, q]
         b = gravity * (z - gravity)
-        room = square - gravity * gravity
+        room = max(limits[r, q] * limits[r, q] - gravity * gravity, 1e-3)
         own = x * x + y * y + (z - gravity) * (z - gravity)
-        slope[0, q] = (b + np.sqrt(b * b + max(room, 1e-3) * own)) / max(room, 1e-3)
-    for q in range(count):
-        worst = max(worst, slope[0, q])
-    for x in range(3):
-        for q in range(count):
-            slope[x, q] = bend[q] * samples[x, 1, q]
+        slopes[first, 0, q] = (b + np.sqrt(b * b + room * own)) / room
+    for q in range(samples.shape[2]):
+        worst = max(worst, slopes[first, 0, q])
+    for x in range(samples.shape[0]):
+        for q in range(samples.shape[2]):
+            slopes[first, x, q] = bends[first, q] * samples[x, 1, q]
     return np.sqrt(worst)
 
 
 @vector
-def _tilt(samples, count, limits, gravity, values, slope, bend):
+def _tilt(samples, limits, gravity, values, r, first, slopes, bends):
     """(|F_xy| cot L - F_z) / g; linear in the stretch squared."""
     worst = 0.0
-    for q in range(count):
-        cotangent = 1.0 / np.tan(limits[q])
+    for q in range(samples.shape[2]):
+        cotangent = 1.0 / np.tan(limits[r, q])
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         across = np.sqrt(x * x + y * y + (ROUNDNESS * gravity) ** 2)
-        values[q] = (across * cotangent - samples[2, 1, q]) / gravity
-        bend[q] = cotangent / (gravity * across)
-        slope[0, q] = bend[q] * x
-        slope[1, q] = bend[q] * y
-        slope[2, q] = -1.0 / gravity
-    for q in range(count):
-        worst = max(worst, values[q] + 1.0)
+        values[r, q] = (across * cotangent - samples[2, 1, q]) / gravity
+        bends[first, q] = cotangent / (gravity * across)
+        slopes[first, 0, q] = bends[first, q] * x
+        slopes[first, 1, q] = bends[first, q] * y
+        slopes[first, 2, q] = -1.0 / gravity
+    for q in range(samples.shape[2]):
+        worst = max(worst, values[r, q] + 1.0)
     return np.sqrt(worst)
 
 
 @vector
-def _tilt_kappa(samples, count, limit, out):
-    for q in range(count):
+def _tilt_kappa(samples, limit, out):
+    for q in range(samples.shape[2]):
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         out[q] = np.arctan2(np.sqrt(x * x + y * y), samples[2, 1, q]) / limit
 
 
 @vector
-def _least_thrust(samples, count, limits, gravity, values, slope, bend):
+def _least_thrust(samples, limits, gravity, values, r, first, slopes, bends):
     """(L - |F|) / g; the stretch is the larger root of |a|^2 + 2 g a_z r + (g^2 - L^2) r^2."""
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         z = samples[2, 1, q]
         norm = np.sqrt(x * x + y * y + z * z + TINY)
-        values[q] = (limits[q] - norm) / gravity
-        bend[q] = 0.0
+        values[r, q] = (limits[r, q] - norm) / gravity
+        bends[first, q] = 0.0
         for axis in range(3):
-            slope[axis, q] = -samples[axis, 1, q] / (gravity * norm)
+            slopes[first, axis, q] = -samples[axis, 1, q] / (gravity * norm)
         b = gravity * (gravity - z)
-        room = gravity * gravity - limits[q] * limits[q]
+        room = gravity * gravity - limits[r, q] * limits[r, q]
         own = x * x + y * y + (z - gravity) * (z - gravity)
         under = b * b - room * own
         needed = (b + np.sqrt(under)) / room if b > 0.0 and under > 0.0 else 0.0
@@ -234,8 +240,8 @@ def _least_thrust(samples, count, limits, gravity, values, slope, bend):
 
 
 @vector
-def _least_thrust_kappa(samples, count, limit, out):
-    for q in range(count):
+def _least_thrust_kappa(samples, limit, out):
+    for q in range(samples.shape[2]):
         x = samples[0, 1, q]
         y = samples[1, 1, q]
         z = samples[2, 1, q]
@@ -271,34 +277,32 @@ def _rooted(ratio):
 
 
 @vector
-def _body_rate(samples, count, limits, gravity, values, first, slopes, bends):
+def _body_rate(samples, limits, gravity, values, r, first, slopes, bends):
     """|j across F| / (|F| L) - 1: how fast the thrust direction turns, against its limit."""
-    by_thrust = slopes[first]
-    by_jerk = slopes[first + 1]
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(samples, q, gravity)
         size = 0.0
         for x in range(3):
             across, _ = _across(samples, x, q, turn, pull)
             size += across * across
-        scale = 1.0 / (square * limits[q] * limits[q])
+        scale = 1.0 / (square * limits[r, q] * limits[r, q])
         worst = max(worst, size * scale)
         root, steep = _rooted(size * scale)
-        values[q] = root - 1.0
+        values[r, q] = root - 1.0
         unit = 2.0 * steep * scale
         for x in range(3):
             across, _ = _across(samples, x, q, turn, pull)
-            by_thrust[x, q] = -unit * (turn * across + size / square * samples[x, 1, q])
-            by_jerk[x, q] = unit * across
+            slopes[first, x, q] = -unit * (turn * across + size / square * samples[x, 1, q])
+            slopes[first + 1, x, q] = unit * across
         bends[first, q] = unit * size / square
         bends[first + 1, q] = unit
     return worst ** (1.0 / 6.0)
 
 
 @vector
-def _body_rate_kappa(samples, count, limit, gravity, out):
-    for q in range(count):
+def _body_rate_kappa(samples, limit, gravity, out):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(samples, q, gravity)
         size = 0.0
         for x in range(3):
@@ -308,16 +312,16 @@ def _body_rate_kappa(samples, count, limit, gravity, out):
 
 
 @vector
-def _angular_acceleration(samples, count, limits, gravity, values, first, slopes, bends):
+def _angular_acceleration(samples, limits, gravity, values, r, first, slopes, bends):
     """|s - 2 r j across F| / (|F| L) - 1 with r = F.j / F.F: how fast that turning changes."""
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(samples, q, gravity)
         size = _swing(samples, q, turn, pull)
-        scale = 1.0 / (square * limits[q] * limits[q])
+        scale = 1.0 / (square * limits[r, q] * limits[r, q])
         worst = max(worst, size * scale)
         root, steep = _rooted(size * scale)
-        values[q] = root - 1.0
+        values[r, q] = root - 1.0
         _swing_slopes(samples, q, square, turn, pull, 2.0 * steep * scale, first, slopes, bends)
     return worst**0.125
 
@@ -359,28 +363,28 @@ def _swing_slopes(samples, q, square, turn, pull, unit, first, slopes, bends):
 
 
 @vector
-def _angular_acceleration_kappa(samples, count, limit, gravity, out):
-    for q in range(count):
+def _angular_acceleration_kappa(samples, limit, gravity, out):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(samples, q, gravity)
         out[q] = np.sqrt(_swing(samples, q, turn, pull) / square) / limit
 
 
 @inner
-def _rotors(figures, kind, samples, count, limits, gravity, values, first, slopes, bends):
+def _rotors(figures, kind, samples, limits, gravity, values, r, first, slopes, bends):
     """Rotor thrusts; not compiled where they are not limited."""
     if figures is None:
         return 0.0
     sign = 1.0 if kind == ROTORS else -1.0
-    return _demand(sign, figures, samples, count, limits, gravity, values, first, slopes, bends)
+    return _demand(sign, figures, samples, limits, gravity, values, r, first, slopes, bends)
 
 
 @vector
-def _with_drag(samples, count, drag, gravity):
+def _with_drag(samples, drag, gravity):
     """(3, 4, S) velocity, F with drag, and its two derivatives; samples hold F without."""
     out = np.empty_like(samples)
     for x in range(3):
         weight = gravity if x == 2 else 0.0
-        for q in range(count):
+        for q in range(samples.shape[2]):
             out[x, 0, q] = samples[x, 0, q]
             out[x, 1, q] = samples[x, 1, q] + drag * samples[x, 0, q]
             out[x, 2, q] = samples[x, 2, q] + drag * (samples[x, 1, q] - weight)
@@ -398,7 +402,7 @@ def _pulled(samples, q):
 
 
 @vector
-def _demand(sign, figures, samples, count, limits, gravity, values, first, slopes, bends):
+def _demand(sign, figures, samples, limits, gravity, values, r, first, slopes, bends):
     """(T + c |alpha|) / L - 1 for the most, (g - T + c |alpha| - L) / g for the least thrust.
 
     T = |F| + epsilon b.v, and c |alpha| is rounded by ROUNDNESS, to the safe side; all as in
@@ -406,19 +410,19 @@ def _demand(sign, figures, samples, count, limits, gravity, values, first, slope
     limit. What is found by F with drag and its derivatives is carried over to those of position.
     """
     reach, drag, along_drag = figures[0], figures[1], figures[2]
-    carried = _with_drag(samples, count, drag, gravity)
+    carried = _with_drag(samples, drag, gravity)
     worst = 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(carried, q, gravity)
         norm = np.sqrt(square)
         moved = _pulled(carried, q) / square
         size = _swing(carried, q, turn, pull)
         swing = np.sqrt(reach * reach * size / square + (ROUNDNESS * gravity) ** 2)
-        room = limits[q] - gravity if sign > 0.0 else limits[q]
+        room = limits[r, q] - gravity if sign > 0.0 else limits[r, q]
         over = sign * (norm * (1.0 + along_drag * moved) - gravity)
         worst = max(worst, (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room))
-        unit = 1.0 / limits[q] if sign > 0.0 else 1.0 / gravity
-        values[q] = unit * (over + swing - room)
+        unit = 1.0 / limits[r, q] if sign > 0.0 else 1.0 / gravity
+        values[r, q] = unit * (over + swing - room)
         bend = unit * reach * reach / (swing * square)
         _swing_slopes(carried, q, square, turn, pull, bend, first + 1, slopes, bends)
         push = sign * unit / norm
@@ -438,18 +442,18 @@ def _demand(sign, figures, samples, count, limits, gravity, values, first, slope
 
 
 @inner
-def _rotors_kappa(figures, kind, samples, count, limit, gravity, out):
+def _rotors_kappa(figures, kind, samples, limit, gravity, out):
     if figures is None:
         return
     sign = 1.0 if kind == ROTORS else -1.0
-    _demand_kappa(sign, figures, samples, count, limit, gravity, out)
+    _demand_kappa(sign, figures, samples, limit, gravity, out)
 
 
 @vector
-def _demand_kappa(sign, figures, samples, count, limit, gravity, out):
-    carried = _with_drag(samples, count, figures[1], gravity)
+def _demand_kappa(sign, figures, samples, limit, gravity, out):
+    carried = _with_drag(samples, figures[1], gravity)
     rest = gravity if sign < 0.0 else 0.0
-    for q in range(count):
+    for q in range(samples.shape[2]):
         square, turn, pull = _turn_of(carried, q, gravity)
         norm = np.sqrt(square)
         thrust = norm + figures[2] * _pulled(carried, q) / norm

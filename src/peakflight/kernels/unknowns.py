@@ -9,6 +9,7 @@ import numpy as np
 from peakflight.kernels import basis
 from peakflight.kernels.conditions import Grid, Layout, Limited, Work
 from peakflight.kernels.interior import MARKS
+from peakflight.kernels.pieces import VECTOR
 from peakflight.kernels.rows import KIND_TERMS, LEANING, TURNING
 
 CELL = 5
@@ -114,21 +115,26 @@ def make_grid(degree: int, samples: int) -> Grid:
     """Tables at Chebyshev-Lobatto points of the unit interval, and at their cells."""
     u = (1.0 - np.cos(np.pi * np.arange(samples) / (samples - 1))) / 2.0
     borders = np.concatenate(([0.0], (u[1:] + u[:-1]) / 2.0, [1.0]))
-    cells = [np.linspace(a, b, CELL) for a, b in pairwise(borders)]
+    cells = np.array([np.linspace(a, b, CELL) for a, b in pairwise(borders)])
     table = basis.derivative_tables(degree, u)
     pairs = [(i, j) for i in range(degree) for j in range(i, degree)]
     pairs.sort(key=lambda pair: pair[0] == 0)
     rows, columns = np.array(pairs).T
+    products = np.zeros((4, samples, -(-len(pairs) // VECTOR) * VECTOR))
+    products[:, :, : len(pairs)] = (table[rows] * table[columns]).transpose(1, 2, 0)
+    dense = basis.derivative_tables(degree, cells.T.ravel())
     # Clenshaw-Curtis: integrates the polynomial through the samples
     moments = [1.0 / (1.0 - n * n) if n % 2 == 0 else 0.0 for n in range(samples)]
     cosines = np.cos(np.pi * np.outer(np.arange(samples), np.arange(samples)) / (samples - 1))
     return Grid(
         orders=basis.row_orders(degree)[:degree].astype(np.int64),
-        table=np.ascontiguousarray(table),
-        dense=np.ascontiguousarray(basis.derivative_tables(degree, np.concatenate(cells))),
+        table=table.reshape(degree, -1),
+        dense=dense.reshape(degree, -1),
         pairs=np.array(pairs, dtype=np.int64),
         still=np.array([sum(i != 0 for i, _ in pairs)]),
-        products=np.ascontiguousarray((table[rows] * table[columns]).transpose(1, 2, 0)),
+        products=products.reshape(4 * samples, -1),
+        steps=np.repeat(np.arange(1.0, 5.0), samples),
+        dense_steps=np.repeat(np.arange(1.0, 5.0), samples * CELL),
         quadrature=np.linalg.solve(cosines, moments),
     )
 
@@ -184,15 +190,15 @@ def make_limited(
 def make_work(layout: Layout, grid: Grid, limited: Limited) -> Work:
     """Arrays to work in."""
     pieces, unknowns = len(layout.clock), len(layout.order)
-    samples = grid.table.shape[2]
+    samples = len(grid.quadrature)
     kinds, terms = len(limited.kinds), len(limited.orders)
     width = band_width(layout)
-    motion, rows = (pieces, 3, 4, samples), (pieces, kinds, samples)
+    rows = (pieces, kinds, samples)
     return Work(
         x=np.empty(unknowns),
         best=np.empty(unknowns),
-        samples=np.empty(motion),
-        rates=np.empty(motion),
+        samples=np.empty((pieces, 3, 4, samples)),
+        rates=np.empty((pieces, 3, 4 * samples)),
         values=np.empty(rows),
         slopes=np.empty((pieces, terms, 3, samples)),
         bends=np.empty((pieces, terms, samples)),
