@@ -71,7 +71,7 @@ def plan(
         tuning = {name: options.pop(name) for name in _fields(module.Settings) & set(options)}
     notes: tuple[str, ...] = ()
     if not isinstance(problem, Problem):
-        problem, notes = _tidied(problem, limits, options)
+        problem, notes = tidied(problem, limits, options)
     elif limits is not None or options:
         given = ", ".join(["limits"] * (limits is not None) + list(options))
         if _fields(Problem).issuperset(options):
@@ -193,7 +193,7 @@ def _fields(kind: Any) -> set[str]:
     return set(kind.__dataclass_fields__)
 
 
-def _tidied(
+def tidied(
     waypoints: ArrayLike, limits: Limits | None, options: dict[str, Any]
 ) -> tuple[Problem, tuple[str, ...]]:
     yaw = options.pop("yaw", None)
