@@ -196,6 +196,13 @@ def _fields(kind: Any) -> set[str]:
 def tidied(
     waypoints: ArrayLike, limits: Limits | None, options: dict[str, Any]
 ) -> tuple[Problem, tuple[str, ...]]:
+    """The problem of waypoints with options of `Problem`, those nearly alike merged; notes on it.
+
+    Raises
+    ------
+    InvalidProblem
+        If an option is unknown or against a rule.
+    """
     yaw = options.pop("yaw", None)
     heading = None if yaw is None else as_heading(yaw)
     course, notes = tidy(

@@ -25,7 +25,7 @@ def main(folder: Path) -> None:
     while (request := folder / REQUEST.format(number)).exists():
         with np.load(request) as given:
             answer = _fly(str(given["drone"]), given["commands"], given["start"])
-        np.savez(folder / ANSWER.format(number), **answer)
+        np.savez(folder / ANSWER.format(number), **answer)  # type: ignore[arg-type]
         number += 1
 
 
@@ -57,7 +57,8 @@ def _fly(drone: str, commands: np.ndarray, start: np.ndarray) -> dict[str, np.nd
         freq=RATE,
         state_freq=COMMAND_RATE,
         attitude_freq=RATE,
-        force_torque_freq=RATE, integrator=__import__("os").environ.get("CFINT","euler"),
+        force_torque_freq=RATE,
+        integrator=__import__("os").environ.get("CFINT", "euler"),
     )
     steps = tuple(simulation.step_pipeline.values())
 

@@ -2,6 +2,6 @@
 
 from peakflight.tuning.result import Point, TuneResult
 from peakflight.tuning.settings import TuneSettings
-from peakflight.tuning.tune import tune
+from peakflight.tuning.tuner import tune
 
 __all__ = ["Point", "TuneResult", "TuneSettings", "tune"]

@@ -28,7 +28,7 @@ FAILED = 1e3
 """Value of what never flies; logarithms of durations are far below."""
 
 OnTrials = Callable[[int, float, float | None], object]
-"""Called with how many plans were tried, the part that is done, and the shortest duration so far."""
+"""Called with how many plans were tried, the part that is done, and the shortest duration."""
 
 
 @dataclass(eq=False)
@@ -124,9 +124,7 @@ class Search:
 class _Strategy:
     """CMA-ES (Hansen 2016) in one family, on the logarithm of the shortest tracked flight."""
 
-    def __init__(
-        self, family: int, begin: Candidate, scale: float, settings: TuneSettings
-    ) -> None:
+    def __init__(self, family: int, begin: Candidate, scale: float, settings: TuneSettings) -> None:
         require_cmaes()
         from cmaes import CMA
 
@@ -146,9 +144,7 @@ class _Strategy:
         points = [tuple(self._cma.ask().tolist()) for _ in range(size)]
         return [Candidate(self._family, point, BEGIN * self._scale) for point in points]
 
-    def tell(
-        self, candidates: Sequence[Candidate], values: Sequence[tuple[float, float]]
-    ) -> None:
+    def tell(self, candidates: Sequence[Candidate], values: Sequence[tuple[float, float]]) -> None:
         """What became of them."""
         self._cma.tell(
             [

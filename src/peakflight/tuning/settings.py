@@ -30,7 +30,7 @@ class TuneSettings:
     precision: float = 0.02
     """Relative step of the scale at which its border counts as found."""
     error_margin: float = 0.05
-    """Part of the error that is kept free: another simulator, or the vehicle, is not quite alike."""
+    """Part of the error that is kept free: another simulator, or the vehicle, is not alike."""
     doubts: tuple[Conditions, ...] = (
         Conditions(thrust_scale=0.97, motor_lag_scale=1.1),
         Conditions(thrust_scale=1.03, inertia_scale=1.05),

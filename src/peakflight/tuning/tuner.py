@@ -1,7 +1,7 @@
 """The fastest plan that a vehicle still tracks within an error."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import replace
@@ -114,9 +114,7 @@ def tune(
         )
     asked = _problem(problem, vehicle, limits, options)
     body = find_vehicle(asked.vehicle)  # type: ignore[arg-type]
-    differing = (Spread() if spread is None else spread).draw(
-        Conditions(), robust, settings.seed
-    )
+    differing = (Spread() if spread is None else spread).draw(Conditions(), robust, settings.seed)
     work = Trying(
         problem=asked,
         vehicle=body,
@@ -177,7 +175,13 @@ def _problem(
         raise InvalidProblem("no vehicle to fly; give vehicle=...")
     body = find_vehicle(vehicle)
     if isinstance(problem, Problem):
-        return replace(problem, vehicle=body, limits=None, degree=None, continuity=None)
+        return replace(
+            problem,
+            vehicle=body,
+            limits=None,  # type: ignore[arg-type]
+            degree=None,
+            continuity=None,
+        )
     for name in ("minimize", "degree", "continuity"):
         if name in options:
             raise InvalidProblem(f"{name} is what the tuner chooses")
@@ -203,9 +207,7 @@ def _best(
         if search.is_good(one) and (key not in fastest or one.duration < fastest[key].duration):
             fastest[key] = one
     chosen = sorted(fastest.values(), key=lambda one: one.duration)[: settings.finalists]
-    tries = [
-        (one, one.scale * NEARER**step) for one in chosen for step in range(SLOWER_STEPS)
-    ]
+    tries = [(one, one.scale * NEARER**step) for one in chosen for step in range(SLOWER_STEPS)]
     planned: list[tuple[float, Trial, Plan]] = []
     for one, scale in tries:
         answer = work.plan(one.family, np.array(one.point), scale)
