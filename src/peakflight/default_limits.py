@@ -14,7 +14,7 @@ from peakflight.limits import GRAVITY, Limits
 MARGIN = 0.25
 """Share of the top thrust that is kept for turning and control: of plans that stay at their limits
 all the time some crashed with 0.15 and with 0.2, none with this."""
-BEHIND = 1.3
+BEHIND = 1.15
 """rad/s, by how much the body rate may fall behind for the motor lag: a rate that changes by alpha
 is late by alpha times the lag. Plans with twice as much crashed, whatever else they kept."""
 DRAG = 0.1

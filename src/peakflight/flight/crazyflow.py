@@ -2,7 +2,8 @@
 
 It has the rigid body of each Crazyflie with identified rotors, and the firmware's Mellinger
 controller. It is given what the Crazyflie's commander would be: position, velocity, acceleration,
-yaw and body rates at 100 Hz. Verdicts follow the same rules as those of `peakflight.fly`.
+yaw and body rates at 100 Hz. A flight begins as the plan does, and verdicts follow the same rules
+as those of `peakflight.fly`: the same question, asked of another model.
 
 Needs the extra crazyflow (JAX and MuJoCo, about 1.1 GB).
 """
@@ -24,7 +25,6 @@ from peakflight.errors import InvalidProblem, MissingExtra, PeakflightError
 from peakflight.flight import crazyflow_worlds as worlds
 from peakflight.flight.conditions import Conditions
 from peakflight.flight.flight import Flight
-from peakflight.flight.rehearsal import REST
 from peakflight.flight.simulate import FlySettings, Outcome, Task, prepare
 from peakflight.kernels import controllers as rows
 from peakflight.kernels import flight as kernels
@@ -45,9 +45,6 @@ DRONES: Mapping[str, str] = {
 """Name of a vehicle to what crazyflow calls it."""
 EVERY = worlds.RATE // worlds.COMMAND_RATE
 """Runs of the attitude loop between two set-points."""
-HOVER = 1.0
-"""s of hovering before a plan that begins at rest: the firmware's thrust is only near what is asked
-for, and its integral has to make up for it."""
 MOST_SAMPLES = 1_500_000
 """Of all worlds at once: some 400 MB."""
 MOST_UNEQUAL = 4.0
@@ -228,9 +225,8 @@ def _start(task: Task) -> np.ndarray:
 
 
 def _samples(task: Task, arrays: Mapping[str, np.ndarray], place: int) -> Samples:
-    """One world's flight, without the hovering before."""
-    begin = _hovering(task) * EVERY
-    part = slice(begin, begin + len(task.rehearsal.times))
+    """One world's flight, without what others last longer."""
+    part = slice(len(task.rehearsal.times))
     flown = arrays["states"][part, place].copy()
     flown[:, 2] -= _lift(task)
     return Samples(flown, arrays["thrusts"][part, place], arrays["saturated"][part, place])
@@ -246,12 +242,8 @@ def _lift(task: Task) -> float:
 
 
 def _commands(task: Task) -> np.ndarray:
-    """(n, 16) set-points at 100 Hz: position, velocity, acceleration, yaw as a quaternion, rates.
-
-    Hovering before is part of them.
-    """
-    rehearsal = task.rehearsal
-    planned = rehearsal.firmware_rows(1.0)[::EVERY]
+    """(n, 16) set-points at 100 Hz: position, its two derivatives, yaw as a quaternion, rates."""
+    planned = task.rehearsal.firmware_rows(1.0)[::EVERY]
     commands = np.zeros((len(planned), 16))
     commands[:, :6] = planned[:, rows.PLANNED_POSITION : rows.PLANNED_THRUST]
     commands[:, 2] += _lift(task)
@@ -259,17 +251,7 @@ def _commands(task: Task) -> np.ndarray:
     commands[:, 11] = np.sin(0.5 * planned[:, rows.PLANNED_YAW])
     commands[:, 12] = np.cos(0.5 * planned[:, rows.PLANNED_YAW])
     commands[:, 13:] = planned[:, rows.PLANNED_RATE : rows.PLANNED_ACCELERATION]
-    hovering = np.repeat(commands[:1], _hovering(task), axis=0)
-    hovering[:, 3:9] = 0.0
-    hovering[:, 13:] = 0.0
-    return np.concatenate((hovering, commands))
-
-
-def _hovering(task: Task) -> int:
-    """Set-points of hovering before the plan."""
-    begin = task.rehearsal.rows[0, rows.PLANNED_VELOCITY : rows.PLANNED_THRUST]
-    moves = max(np.abs(begin).max(), np.abs(task.rehearsal.acceleration[0]).max())
-    return 0 if moves > REST else round(HOVER * worlds.COMMAND_RATE)
+    return commands
 
 
 def _judged(task: Task, samples: Samples) -> Outcome:

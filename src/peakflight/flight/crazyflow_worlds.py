@@ -58,7 +58,6 @@ def _fly(drone: str, commands: np.ndarray, start: np.ndarray) -> dict[str, np.nd
         state_freq=COMMAND_RATE,
         attitude_freq=RATE,
         force_torque_freq=RATE,
-        integrator=__import__("os").environ.get("CFINT", "euler"),
     )
     steps = tuple(simulation.step_pipeline.values())
 

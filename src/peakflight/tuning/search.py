@@ -157,6 +157,21 @@ class _Strategy:
             self._scale = float(np.median(scales))
 
 
+def prepare_kernels(work: Trying, executor: Executor | None) -> bool:
+    """Have the kernels of every family compiled, each once; whether there was anything to do."""
+    origin = tuple(np.zeros(len(LOW)).tolist())
+    missing = [
+        candidate
+        for candidate in (Candidate(n, origin, FIRST_SCALE) for n in range(len(FAMILIES)))
+        if work.first(candidate)
+    ]
+    if missing:
+        workers = 1 if executor is None else None
+        for _ in run(work, missing, executor=executor, workers=workers, chunk=1):
+            pass
+    return bool(missing)
+
+
 def require_cmaes() -> Any:
     """Import the evolution strategy.
 

@@ -21,7 +21,7 @@ from peakflight.planner import tidied
 from peakflight.problem import Problem
 from peakflight.result import Plan
 from peakflight.tuning.result import Point, TuneResult
-from peakflight.tuning.search import Search, require_cmaes
+from peakflight.tuning.search import Search, prepare_kernels, require_cmaes
 from peakflight.tuning.settings import TuneSettings
 from peakflight.tuning.space import FAMILIES, limits_at
 from peakflight.tuning.trial import Trial, Trying
@@ -83,8 +83,9 @@ def tune(
     settings
         How widely to search.
     budget
-        s, after which the best so far is returned; None for the search's own end. The result is the
-        same for a seed, whatever the workers, unless the budget ends it.
+        s, after which the best so far is returned; None for the search's own end. What has to be
+        compiled first, once on a machine, does not count. The result is the same for a seed,
+        whatever the workers, unless the budget ends it.
     executor
         Where plans are made and flown; it is not shut down. None for processes of this machine.
     workers
@@ -125,7 +126,6 @@ def tune(
         precision=settings.precision,
         within=limits,
     )
-    deadline = np.inf if budget is None else began + budget
     with ExitStack() as stack:
         if executor is None:
             count = checked_workers(workers)
@@ -135,6 +135,10 @@ def tune(
                 executor = own
         elif workers is not None:
             raise InvalidProblem("workers given beside an executor, which has its own")
+        ready = prepare_kernels(work, executor)
+        if ready:  # what is compiled once on a machine does not count
+            began = time.perf_counter()
+        deadline = np.inf if budget is None else began + budget
         search = Search(
             work=work,
             settings=settings,
