@@ -43,13 +43,13 @@ class Kind(NamedTuple):
 
 
 KINDS = (
-    Kind("proportional", {}, (0.0, 0.15), (30.0, 300.0)),
-    Kind("mellinger", {}, (0.0, 0.15), (30.0, 300.0)),
-    Kind("bry", {}, (0.0, 0.15), (30.0, 300.0)),
-    Kind("peak", {}, (0.0, 0.18), (20.0, 250.0)),
-    Kind("peak", {"minimize": "snap"}, (0.0, 0.18), (20.0, 250.0)),
-    Kind("joint", {}, (0.08, 0.3), (10.0, 50.0)),
-    Kind("joint", {"pieces": 1}, (0.05, 0.3), (10.0, 70.0)),
+    Kind("proportional", {}, (0.0, 0.12), (60.0, 600.0)),
+    Kind("mellinger", {}, (0.0, 0.12), (60.0, 600.0)),
+    Kind("bry", {}, (0.0, 0.12), (60.0, 600.0)),
+    Kind("peak", {}, (0.0, 0.15), (40.0, 500.0)),
+    Kind("peak", {"minimize": "snap"}, (0.0, 0.15), (40.0, 500.0)),
+    Kind("joint", {}, (0.08, 0.3), (15.0, 60.0)),
+    Kind("joint", {"pieces": 1}, (0.05, 0.3), (20.0, 100.0)),
 )
 COLUMNS: list[Column] = [
     ("vehicle", ""), ("plans", "d"), ("flew here", "d"), ("flew there", "d"),
@@ -168,6 +168,6 @@ def _limits(vehicle: pf.Vehicle, margin: float, turning: float) -> pf.Limits:
         tilt=tilt,
         body_rate=rate,
         angular_acceleration=turning,
-        jerk=min(rate * thrust, (thrust - lowest) / vehicle.motor_lag),
+        jerk=rate * thrust,
         snap=turning * thrust,
     )
