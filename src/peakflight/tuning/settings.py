@@ -21,7 +21,7 @@ class TuneSettings:
     """Proportions of limits to begin with, in each family of plans."""
     families: int = 2
     """Families that go on after the scan: those with the fastest flights."""
-    generations: int = 24
+    generations: int = 32
     """Of the evolution strategy in each of these."""
     population: int = 10
     """Proportions of limits in each generation."""
@@ -41,7 +41,7 @@ class TuneSettings:
     """Fastest plans that are looked at closely at the end."""
     final_doubts: int = 12
     """Vehicles that differ a little, which these have to stand."""
-    final_spread: float = 0.02
+    final_spread: float = 0.01
     """Standard deviation of their mass, thrust and inertia, relative; twice that of the lag."""
     seed: int = 0
 

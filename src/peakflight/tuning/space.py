@@ -56,11 +56,11 @@ class Coordinate(NamedTuple):
 
 COORDINATES = (
     Coordinate("speed", 1, -0.7, 0.7),
-    Coordinate("thrust_acceleration", 2, -0.9, 0.4),
-    Coordinate("tilt", 2, -0.9, 0.7),
-    Coordinate("body_rate", 1, -0.7, 0.7),
-    Coordinate("jerk", 3, -1.4, 1.0),
-    Coordinate("snap", 4, -1.8, 1.0),
+    Coordinate("thrust_acceleration", 2, -0.7, 0.9),
+    Coordinate("tilt", 2, -0.8, 0.8),
+    Coordinate("body_rate", 1, -0.8, 0.8),
+    Coordinate("jerk", 3, -1.2, 1.2),
+    Coordinate("snap", 4, -1.2, 1.5),
 )
 """Relative to angular acceleration, which the scale alone moves. Of thrust acceleration it is the
 horizontal part at level flight that counts, of tilt the tangent."""
@@ -75,6 +75,9 @@ BEHIND = 3.0
 """rad/s, by which the body rate is late for the motor lag, in the reference."""
 RESERVE = 0.15
 """Of the top thrust of each rotor, which turns the vehicle, in the reference."""
+LEVEL, SMOOTH = 0.6, 0.4
+"""Of the horizontal acceleration of level flight at the usual thrust, and of the snap of that thrust
+turned at the angular acceleration, in the reference: what flies fast is limited in snap first."""
 DRAG = 0.2
 """Of the top thrust that drag takes, at the speed of the reference."""
 STEEPEST = math.radians(80.0)
@@ -94,12 +97,12 @@ def reference(vehicle: Vehicle) -> dict[str, float]:
     drag = vehicle.drag[0]
     return {
         "speed": DRAG * 4.0 * most / drag if drag > 0.0 else math.inf,
-        "thrust_acceleration": sideways,
+        "thrust_acceleration": LEVEL * sideways,
         "tilt": sideways / GRAVITY,
         "body_rate": rate,
         "angular_acceleration": turning,
         "jerk": rate * thrust,
-        "snap": turning * thrust,
+        "snap": SMOOTH * turning * thrust,
         "least_thrust_acceleration": min(4.0 * (least + RESERVE * most) / vehicle.mass, 9.0),
     }
 
