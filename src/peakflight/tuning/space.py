@@ -76,8 +76,9 @@ BEHIND = 3.0
 RESERVE = 0.15
 """Of the top thrust of each rotor, which turns the vehicle, in the reference."""
 LEVEL, SMOOTH = 0.6, 0.4
-"""Of the horizontal acceleration of level flight at the usual thrust, and of the snap of that thrust
-turned at the angular acceleration, in the reference: what flies fast is limited in snap first."""
+"""Of the horizontal acceleration of level flight at the usual thrust, and of the snap of that
+thrust turned at the angular acceleration, in the reference: what flies fast is limited in snap
+first."""
 DRAG = 0.2
 """Of the top thrust that drag takes, at the speed of the reference."""
 STEEPEST = math.radians(80.0)
