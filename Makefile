@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test check format bench docs clean
+.PHONY: demo test check crazyflow format bench docs clean
 
 demo: $(STAMP) ## plan a real racing course, prove it, and write flight file and pictures
 	$(BIN)/peakflight plan examples/courses/uzh_19wp.json --max-pieces 31 -o out/demo
@@ -20,6 +20,10 @@ check: $(STAMP) ## format, lint, types, import contracts, examples
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python examples/run_all.py
+
+crazyflow: $(STAMP) ## install crazyflow (1.1 GB), and fly a few plans there
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[crazyflow]'
+	$(BIN)/python -m pytest -q tests/test_crazyflow.py
 
 format: $(STAMP) ## mend format and what lint can mend
 	$(BIN)/ruff format .

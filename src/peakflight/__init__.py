@@ -44,11 +44,13 @@ if TYPE_CHECKING:
         fly,
         fly_spread,
     )
+    from peakflight.flight.crazyflow import fly_crazyflow
     from peakflight.importing import Imported, import_trajectory
     from peakflight.joining import join
     from peakflight.planner import plan, replan
     from peakflight.separation import ClosestApproach, closest_approach
     from peakflight.spline import minimum_effort_spline
+    from peakflight.tuning import TuneResult, TuneSettings, tune
 
 __all__ = [
     "GRAVITY",
@@ -83,6 +85,8 @@ __all__ = [
     "Status",
     "Trajectory",
     "TrajectoryFile",
+    "TuneResult",
+    "TuneSettings",
     "Vehicle",
     "__version__",
     "analyse",
@@ -94,6 +98,7 @@ __all__ = [
     "find_vehicle",
     "flat_states",
     "fly",
+    "fly_crazyflow",
     "fly_many",
     "fly_spread",
     "import_trajectory",
@@ -109,6 +114,7 @@ __all__ = [
     "states_along",
     "stretch_to_limits",
     "tidy",
+    "tune",
 ]
 
 _LAZY = {
@@ -126,6 +132,8 @@ _LAZY = {
     "Spread": "peakflight.flight",
     "SpreadResult": "peakflight.flight",
     "analyse": "peakflight.flight",
+    "TuneResult": "peakflight.tuning",
+    "TuneSettings": "peakflight.tuning",
     "certify": "peakflight.certificate",
     "certify_plan": "peakflight.certificate",
     "closest_approach": "peakflight.separation",
@@ -133,6 +141,7 @@ _LAZY = {
     "export": "peakflight.exporting",
     "flat_states": "peakflight.flatness",
     "fly": "peakflight.flight",
+    "fly_crazyflow": "peakflight.flight.crazyflow",
     "fly_many": "peakflight.batch",
     "fly_spread": "peakflight.flight",
     "import_trajectory": "peakflight.importing",
@@ -144,6 +153,7 @@ _LAZY = {
     "replan": "peakflight.planner",
     "states_along": "peakflight.flatness",
     "stretch_to_limits": "peakflight.certificate",
+    "tune": "peakflight.tuning",
 }
 
 

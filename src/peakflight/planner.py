@@ -71,7 +71,7 @@ def plan(
         tuning = {name: options.pop(name) for name in _fields(module.Settings) & set(options)}
     notes: tuple[str, ...] = ()
     if not isinstance(problem, Problem):
-        problem, notes = _tidied(problem, limits, options)
+        problem, notes = tidied(problem, limits, options)
     elif limits is not None or options:
         given = ", ".join(["limits"] * (limits is not None) + list(options))
         if _fields(Problem).issuperset(options):
@@ -193,9 +193,16 @@ def _fields(kind: Any) -> set[str]:
     return set(kind.__dataclass_fields__)
 
 
-def _tidied(
+def tidied(
     waypoints: ArrayLike, limits: Limits | None, options: dict[str, Any]
 ) -> tuple[Problem, tuple[str, ...]]:
+    """The problem of waypoints with options of `Problem`, those nearly alike merged; notes on it.
+
+    Raises
+    ------
+    InvalidProblem
+        If an option is unknown or against a rule.
+    """
     yaw = options.pop("yaw", None)
     heading = None if yaw is None else as_heading(yaw)
     course, notes = tidy(

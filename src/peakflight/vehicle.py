@@ -253,6 +253,7 @@ class Vehicle:
             rotor_thrust=self.rotor_thrust,
             motor_lag=self.motor_lag,
             body_rate=None if self.body_rate is None else self.body_rate[0],
+            drag=self.drag[0],
         )
 
     def _set(self, name: str, value: Any) -> None:

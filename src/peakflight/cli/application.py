@@ -35,6 +35,7 @@ from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
 from peakflight.cli.plan_many import plan_many
 from peakflight.cli.show import show
+from peakflight.cli.tune import tune
 from peakflight.cli.vehicles import vehicles
 from peakflight.errors import PeakflightError
 
@@ -119,6 +120,7 @@ application.add_command(import_)
 application.add_command(show)
 application.add_command(fly)
 application.add_command(paper)
+application.add_command(tune)
 application.add_command(vehicles)
 
 

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 
 NAMES = ("geometric", "firmware")
 """Controllers, here so that help does not wait for kernels."""
+OWN, CRAZYFLOW = "peakflight", "crazyflow"
+"""Simulators."""
+OF_OURS = ("controller", "flights", "wind", "gust", "latency", "noise", "mass_scale",
+           "thrust_scale", "no_drag", "seed")  # fmt: skip
+"""Options that only our own simulator has, by parameter."""
 
 
 def check_error(
@@ -45,6 +50,14 @@ def check_error(
     default=NAMES[0],
     show_default=True,
     help="What steers: an ideal tracker, or one after the Crazyflie's firmware.",
+)
+@click.option(
+    "--simulator",
+    type=click.Choice((OWN, CRAZYFLOW)),
+    default=OWN,
+    show_default=True,
+    help="Where: crazyflow is an independent simulator of the Crazyflies under their firmware's "
+    "controller; it needs the extra crazyflow.",
 )
 @click.option(
     "--error",
@@ -83,6 +96,7 @@ def fly(
     file: Path,
     vehicle: Vehicle | None,
     controller: str,
+    simulator: str,
     error: float | None,
     flights: int | None,
     output: Path | None,
@@ -98,13 +112,17 @@ def fly(
     Example:
       peakflight fly course-plan/plan.json --vehicle racing-quad -o flight
       peakflight fly course-plan/plan.json --controller firmware --spread 200
+      peakflight fly course-plan/plan.json --simulator crazyflow
     """  # noqa: D301
+    if simulator == CRAZYFLOW:
+        _refuse_ours(click.get_current_context())
     with Progress() as progress:
         progress.stage(f"reading {file.name}")
         plan = Plan.load(file)
         if plan.vehicle is None and vehicle is None:
             raise InvalidFile(f"{file}: the plan names no vehicle to fly it; give --vehicle NAME")
-        asked = Asked(plan, vehicle, controller, _conditions(conditions), error, flights)
+        steered = CRAZYFLOW if simulator == CRAZYFLOW else controller
+        asked = Asked(plan, vehicle, steered, _conditions(conditions), error, flights)
         if output is None:
             flight, spread = _fly(asked, progress)
             files: dict[str, Path] = {}
@@ -129,6 +147,7 @@ class Asked(NamedTuple):
     plan: Plan
     vehicle: Vehicle | None
     controller: str
+    """Or `CRAZYFLOW`, which has its own."""
     conditions: "Conditions"
     error: float | None
     flights: int | None
@@ -136,6 +155,11 @@ class Asked(NamedTuple):
 
 def _fly(asked: Asked, progress: Progress) -> tuple["Flight", "SpreadResult | None"]:
     """Fly once, and as often as the spread says."""
+    if asked.controller == CRAZYFLOW:
+        from peakflight.flight.crazyflow import fly_crazyflow
+
+        progress.stage("flying in crazyflow")
+        return fly_crazyflow([asked.plan], vehicle=asked.vehicle)[0], None
     from peakflight.flight import fly as simulate
     from peakflight.flight import fly_spread
     from peakflight.flight.spread import ERROR
@@ -157,6 +181,18 @@ def _fly(asked: Asked, progress: Progress) -> tuple["Flight", "SpreadResult | No
     error = ERROR if asked.error is None else asked.error
     spread = fly_spread(asked.plan, **shared, flights=count, error=error, on_flight=show)
     return flight, spread
+
+
+def _refuse_ours(context: click.Context) -> None:
+    """Options that mean nothing to crazyflow are not passed over in silence."""
+    given = click.core.ParameterSource.COMMANDLINE
+    for parameter in context.command.params:
+        if parameter.name in OF_OURS and context.get_parameter_source(parameter.name) is given:
+            raise click.UsageError(
+                f"{parameter.opts[0]} is of our own simulator; crazyflow flies the vehicle as it "
+                "is, under its firmware",
+                context,
+            )
 
 
 def _conditions(given: dict[str, Any]) -> "Conditions":

@@ -101,15 +101,18 @@ def vehicle_option(command: _Command) -> _Command:
     )(command)
 
 
-def limits_option(help: str, default: Limits | None = None) -> Callable[[_Command], _Command]:
+def limits_option(
+    help: str, default: Limits | None = None, otherwise: str = "those in the file"
+) -> Callable[[_Command], _Command]:
     """Option `--limits` of a command; it may be repeated, and is None if not given.
 
     Parameters
     ----------
-    default
-        What the command takes then, for the help text.
+    default, otherwise
+        What the command takes then, for the help text: limits, or in words.
     """
-    otherwise = "those in the file" if default is None else f"the paper's {written(default, ', ')}"
+    if default is not None:
+        otherwise = f"the paper's {written(default, ', ')}"
     return click.option(
         "--limits",
         multiple=True,

@@ -186,11 +186,11 @@ def plan(
                 said = (*notes, answer.message) if answer.message else notes
                 answer = replace(answer, message="; ".join(said))
             progress.stage("writing the files")
-            files, more = _write(answer, folder, exports)
+            files, more = write_plan_files(answer, folder, exports)
             more = (*remarks, *more)
             if not no_figures:
                 progress.stage("drawing the pictures")
-                drawn, why_not = _draw(answer, folder)
+                drawn, why_not = draw_plan(answer, folder)
                 files, more = {**files, **drawn}, (*more, *why_not)
         if read.times is not None:
             notes = (*notes, UNUSED_TIMES)
@@ -211,7 +211,7 @@ def plan(
             after=more,
             folder=folder.path,
             files=files,
-            summaries=_summaries(),
+            summaries=file_summaries(),
         )
     if not answer.feasible:
         click.echo(f"peakflight: no feasible trajectory ({answer.status})", err=True)
@@ -237,7 +237,7 @@ def _solve(problem: Problem, method: str, tuning: dict[str, Any]) -> Plan:
     return solve(problem, method=method, **tuning)
 
 
-def _write(
+def write_plan_files(
     plan: Plan, folder: OutputFolder, exports: tuple[str, ...]
 ) -> tuple[dict[str, Path], tuple[str, ...]]:
     """Write the plan and, if it may be flown, its flight files; notes for whoever flies them."""
@@ -260,7 +260,8 @@ def _write(
     return files, tuple(notes)
 
 
-def _draw(plan: Plan, folder: OutputFolder) -> tuple[dict[str, Path], tuple[str, ...]]:
+def draw_plan(plan: Plan, folder: OutputFolder) -> tuple[dict[str, Path], tuple[str, ...]]:
+    """Draw the pictures of a plan; or a note why there are none."""
     try:
         from peakflight.figures import save_figures
     except MissingExtra as error:
@@ -277,7 +278,7 @@ def _stale(folder: OutputFolder, files: dict[str, Path]) -> list[str]:
     return [name for name in names if name not in written and folder.published(name).exists()]
 
 
-def _summaries() -> dict[str, str]:
+def file_summaries() -> dict[str, str]:
     """What each file is, by the names of files."""
     flight_files = {name: one.summary for name, one in FLIGHT_FORMATS.items()}
     return {"plan": "the plan itself; peakflight check proves it", **flight_files, **PICTURES}
