@@ -68,14 +68,16 @@ def names() -> list[str]:
     return sorted((path.stem for path in FOLDER.glob("*.json")), key=lambda n: len(course(n)))
 
 
-def unseen(index: int) -> np.ndarray:
+def unseen(
+    index: int, legs: tuple[int, int] = (2, 40), lengths: tuple[float, float] = (0.05, 20.0)
+) -> np.ndarray:
     """(K+1, 3) m: 2 to 40 legs of 0.05 to 20 m (log-uniform), in any direction."""
     rng = np.random.default_rng([SEED, index])
-    legs = int(rng.integers(2, 41))
-    directions = rng.normal(size=(legs, 3))
+    count = int(rng.integers(legs[0], legs[1] + 1))
+    directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lengths = np.exp(rng.uniform(np.log(0.05), np.log(20.0), size=(legs, 1)))
-    return np.vstack((np.zeros(3), np.cumsum(lengths * directions, axis=0)))
+    distances = np.exp(rng.uniform(*np.log(lengths), size=(count, 1)))
+    return np.vstack((np.zeros(3), np.cumsum(distances * directions, axis=0)))
 
 
 def walk(legs: int, *index: int) -> np.ndarray:

@@ -115,6 +115,32 @@ def test_the_free_yaw_is_better_on_finer_parts():
     assert worst[2] <= worst[1] / 8.0
 
 
+def test_parts_are_halved_where_the_thrust_swings_past_straight_down():
+    """Down at more than gravity, past the vertical: the yaw swings round."""
+    lean = np.array([[0, 0, 0], [0.3, 0, 0], [0, 1.0, -GRAVITY / 2 - 2.5], [3.0, 0, 0]], float)
+    flight = Trajectory(lean[None], [0.4])
+    times = np.linspace(0.0, 0.4, 4001)
+    worst, parts = [], []
+    for closeness in (np.inf, 1e-1, 1e-4):
+        yaw = untwisted(flight, np.array([4]), None, closeness=closeness)
+        worst.append(np.abs(turning_about_z(flight, yaw, times, None)[1]).max())
+        parts.append(len(yaw))
+        for order in range(2):
+            ends = yaw.at(np.arange(len(yaw)), yaw.segment_times, order)[:-1]
+            begins = yaw.at(np.arange(1, len(yaw)), np.zeros(len(yaw) - 1), order)
+            assert np.abs(ends - begins).max() <= 1e-9 * (1.0 + np.abs(begins).max())
+    assert parts[0] == 4 < parts[1] < parts[2]
+    assert worst[0] > 1.0
+    assert worst[1] <= 2.0 * 1e-1  # looked at in three places of each part
+    assert worst[2] <= 2.0 * 1e-4
+
+
+def test_a_reserve_of_hardly_anything_is_a_limit():
+    """Rotors that may stop: what is set aside may be less than the least that a limit can be."""
+    spared = RACER.limits.sparing({"least_rotor_thrust": 1e-9})
+    assert 0.0 < spared.least_rotor_thrust <= 1e-6
+
+
 def test_straight_up_the_nose_stays():
     made = pf.plan([[0, 0, 0], [0, 0, 2]], vehicle=RACER)
     assert not made.yaw_motion.coefficients.any()

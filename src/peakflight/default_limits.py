@@ -40,7 +40,8 @@ def default_limits(
     Within the limits of thrust acceleration, least thrust acceleration and angular acceleration
     every rotor of a vehicle with J_x = J_y and no drag stays in its range at any heading, as long
     as it does not turn about its thrust axis. What a yaw, drag and unequal inertias take comes on
-    top, and can be more than the margin: the note on the samples of a plan says so.
+    top, and can be more than the margin: the note on the samples of a plan says so. Limits on the
+    rotors themselves (`Vehicle.on_rotors`) count all of it.
 
     Parameters
     ----------

@@ -210,7 +210,8 @@ class Limits:
         for name, demand in demands.items():
             limit = getattr(self, name)
             towards = hover - limit
-            changed[name] = limit + math.copysign(min(demand, 0.5 * abs(towards)), towards)
+            value = limit + math.copysign(min(demand, 0.5 * abs(towards)), towards)
+            changed[name] = max(value, SMALLEST)
         return replace(self, **changed)
 
     @property

@@ -6,6 +6,9 @@ axis, by omega = -w_3 / (1 + b_3) where w = F x j / F.F is how b turns, and F is
 drag, j its derivative (`kernels.rotors`). A yaw with psi' = -omega undoes it.
 """
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 from peakflight.airframe import Airframe
@@ -14,6 +17,10 @@ from peakflight.trajectory import Trajectory
 
 UPSIDE_DOWN = 1e-9
 """1 + b_3 below this: no way to tilt there is the shortest, and the yaw stays as it is."""
+HALVINGS = 8
+"""Most times that a part of a yaw is halved."""
+LOOKS = (0.2, 0.5, 0.8)
+"""Where in a part the error is looked at: it is zero at both ends."""
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _HERMITE = np.linalg.inv(
     np.array(
@@ -30,7 +37,13 @@ _HERMITE = np.linalg.inv(
 """Coefficients of degree 5 from value, slope and curvature at 0 and at 1."""
 
 
-def untwisted(flight: Trajectory, counts: np.ndarray, airframe: Airframe | None) -> Trajectory:
+def untwisted(
+    flight: Trajectory,
+    counts: np.ndarray,
+    airframe: Airframe | None,
+    *,
+    closeness: float = math.inf,
+) -> Trajectory:
     """The yaw from 0 at which a vehicle that flies does not turn about its thrust.
 
     Parameters
@@ -42,26 +55,36 @@ def untwisted(flight: Trajectory, counts: np.ndarray, airframe: Airframe | None)
         and acceleration.
     airframe
         What flies, for its drag; None if not known.
+    closeness
+        Parts are halved where the acceleration is off by more, rad/s^2: a thrust that nearly points
+        straight down swings round within milliseconds.
 
     Returns
     -------
     One axis, rad. It jumps in acceleration where the snap of the flight does.
     """
-    parts = np.repeat(flight.segment_times / counts, counts)
+    durations = np.repeat(flight.segment_times / counts, counts)
     piece = np.repeat(np.arange(len(flight)), counts)
-    begins = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece]) * parts
-    nodes = begins[:, None] + parts[:, None] * (0.5 + 0.5 * _GAUSS)
-    rates, _ = _tilting(flight, np.repeat(piece, len(_GAUSS)), nodes.ravel(), airframe)
-    turns = -0.5 * parts * (rates.reshape(nodes.shape) * _WEIGHTS).sum(axis=1)
-    values = np.concatenate(([0.0], np.cumsum(turns)))
-    ends = np.empty((len(piece), 6))
-    for side in range(2):
-        rate, acceleration = _tilting(flight, piece, begins + side * parts, airframe)
-        ends[:, 3 * side] = values[side : len(values) - 1 + side]
-        ends[:, 3 * side + 1] = -rate * parts
-        ends[:, 3 * side + 2] = -acceleration * parts**2
-    coefficients = ends @ _HERMITE.T / parts[:, None] ** np.arange(6)
-    return Trajectory(coefficients[:, :, None], parts, flight.start_time)
+    begins = (np.arange(len(piece)) - (np.cumsum(counts) - counts)[piece]) * durations
+    waiting = _Parts(piece, begins, durations)
+    done: list[tuple[_Parts, np.ndarray]] = []
+    for halving in range(HALVINGS + 1):
+        fits = _fits(flight, waiting, airframe)
+        is_close = np.ones(len(waiting.piece), dtype=bool)
+        if closeness < math.inf and halving < HALVINGS:
+            is_close = _error(flight, waiting, fits, airframe) <= closeness
+        done.append((waiting.only(is_close), fits[is_close]))
+        if is_close.all():
+            break
+        waiting = waiting.only(~is_close).halves()
+    parts = _Parts(*(np.concatenate([own[k] for own, _ in done]) for k in range(3)))
+    fits = np.concatenate([own for _, own in done])
+    order = np.lexsort((parts.begins, parts.piece))
+    durations, fits = parts.durations[order], fits[order]
+    turns = fits.sum(axis=1)
+    fits[:, 0] = np.cumsum(turns) - turns
+    coefficients = fits / durations[:, None] ** np.arange(6)
+    return Trajectory(coefficients[:, :, None], durations, flight.start_time)
 
 
 def turning_about_z(
@@ -71,6 +94,52 @@ def turning_about_z(
     piece = np.searchsorted(flight.breakpoints[1:-1], times, side="right")
     rate, acceleration = _tilting(flight, piece, times - flight.breakpoints[piece], airframe)
     return yaw(times, 1)[:, 0] + rate, yaw(times, 2)[:, 0] + acceleration
+
+
+class _Parts(NamedTuple):
+    """Parts of the pieces of a flight, (n,) each."""
+
+    piece: np.ndarray
+    begins: np.ndarray
+    """s since the piece began."""
+    durations: np.ndarray
+
+    def only(self, which: np.ndarray) -> "_Parts":
+        return _Parts(*(column[which] for column in self))
+
+    def halves(self) -> "_Parts":
+        half = np.repeat(0.5 * self.durations, 2)
+        begins = np.repeat(self.begins, 2)
+        begins[1::2] += half[1::2]
+        return _Parts(np.repeat(self.piece, 2), begins, half)
+
+
+def _fits(flight: Trajectory, parts: _Parts, airframe: Airframe | None) -> np.ndarray:
+    """(n, 6) coefficients of the yaw in the part's own time from 0 to 1, from 0 on."""
+    piece, begins, durations = parts
+    nodes = begins[:, None] + durations[:, None] * (0.5 + 0.5 * _GAUSS)
+    rates, _ = _tilting(flight, np.repeat(piece, len(_GAUSS)), nodes.ravel(), airframe)
+    ends = np.zeros((len(piece), 6))
+    ends[:, 3] = -0.5 * durations * (rates.reshape(nodes.shape) * _WEIGHTS).sum(axis=1)
+    for side in range(2):
+        rate, acceleration = _tilting(flight, piece, begins + side * durations, airframe)
+        ends[:, 3 * side + 1] = -rate * durations
+        ends[:, 3 * side + 2] = -acceleration * durations**2
+    fits: np.ndarray = ends @ _HERMITE.T
+    return fits
+
+
+def _error(
+    flight: Trajectory, parts: _Parts, fits: np.ndarray, airframe: Airframe | None
+) -> np.ndarray:
+    """(n,) rad/s^2, about the largest error of the acceleration."""
+    worst = np.zeros(len(fits))
+    powers = np.arange(2, 6)
+    for at in LOOKS:
+        _, tilting = _tilting(flight, parts.piece, parts.begins + at * parts.durations, airframe)
+        fitted = (fits[:, 2:] * powers * (powers - 1) * at ** (powers - 2)).sum(axis=1)
+        worst = np.maximum(worst, np.abs(fitted / parts.durations**2 + tilting))
+    return worst
 
 
 def _tilting(

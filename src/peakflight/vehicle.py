@@ -190,9 +190,9 @@ class Vehicle:
     def on_rotors(self) -> Self:
         """The vehicle limited by its rotors and its body rate, in place of what stands for them.
 
-        There is no margin then: every rotor keeps its range at any heading, as long as the vehicle
-        does not twist about its thrust axis, and nothing of it is left for control. A yaw that is
-        held or steered twists it; the body rate is that across the axis.
+        There is no margin then: every rotor keeps its range, drag, unequal inertia and the yaw of
+        the plan included, and nothing of it is left for control. The body rate is that across the
+        thrust axis.
         """
         least, most = self.rotor_thrust
         limits = Limits(

@@ -9,6 +9,7 @@ Where limits are about the body, that spline is what is added to the yaw at whic
 not turn about its thrust (`peakflight.twist`): its rate and acceleration are those of the body.
 """
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -51,8 +52,10 @@ ROUNDS = 30
 """Most linear programs to the smallest stretch; 2 to 8 are usual."""
 CLOSENESS = 1e-7
 """Relative change of the stretch at which that ends."""
+CLOSE = 1e-3
+"""Part of what turning about z may take that a free nose may be off by."""
 FINER = 2
-"""Parts of the yaw without turning to one of the spline that is added to it."""
+"""Parts of the yaw without turning to one of the spline that is added to it, at least."""
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 
@@ -94,7 +97,12 @@ def turning(
     heading = _sparing(problem, heading).within(share)
     free = None
     if heading.is_about_body:
-        free = untwisted(trajectory, FINER * np.diff(spline.firsts), problem.airframe)
+        free = untwisted(
+            trajectory,
+            FINER * np.diff(spline.firsts),
+            problem.airframe,
+            closeness=_closeness(problem, heading),
+        )
         if heading.policy == "free":
             return Turning(free, 1.0, 0.0)
     if heading.angles is not None:
@@ -109,9 +117,28 @@ def turning(
         return found
     if found.stretch > 1.0:  # a slower flight swings its thrust otherwise
         return found._replace(yaw=None)
-    added = found.yaw.subdivide(FINER).elevate(free.degree).coefficients
-    whole = Trajectory(free.coefficients + added, free.segment_times, free.start_time)
-    return found._replace(yaw=whole)
+    return found._replace(yaw=_added(free, found.yaw))
+
+
+def _added(free: Trajectory, more: Trajectory) -> Trajectory:
+    """The sum of two yaw motions, of which each piece of the first lies within one of the other."""
+    middles = free.breakpoints[:-1] + 0.5 * free.segment_times
+    piece = np.searchsorted(more.breakpoints[1:-1], middles)
+    local = np.maximum(free.breakpoints[:-1] - more.breakpoints[piece], 0.0)
+    coefficients = free.coefficients.copy()
+    for order in range(more.degree + 1):
+        coefficients[:, order] += more.at(piece, local, order) / math.factorial(order)
+    return Trajectory(coefficients, free.segment_times, free.start_time)
+
+
+def _closeness(problem: Problem, heading: Heading) -> float:
+    """How near to not turning about z a free nose has to be, rad/s^2."""
+    rooms, airframe = problem.limits.rotor_rooms, problem.limits.airframe
+    allowed = [] if heading.acceleration is None else [heading.acceleration]
+    if rooms and airframe is not None and airframe.can_steer:
+        spin = float(airframe.steering[SPIN])
+        allowed.append(min(rooms.values()) * 4.0 / (airframe.mass * spin))
+    return CLOSE * min(allowed, default=math.inf)
 
 
 def _sparing(problem: Problem, heading: Heading) -> Heading:
