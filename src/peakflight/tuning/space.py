@@ -23,21 +23,34 @@ class Family:
     method: str
     minimize: str = "jerk"
     options: Mapping[str, Any] = field(default_factory=dict)
+    effort: float = 0.0
+    """What jerk at its limit costs, over the time that it lasts: a smoother plan for a slower one.
+    Of method joint."""
 
     @property
     def name(self) -> str:
         """For people."""
         parts = [f"{key}={value}" for key, value in self.options.items()]
+        parts += [f"effort {self.effort:g} of the time"] if self.effort else []
         return ", ".join([f"{self.method} (min {self.minimize})", *parts])
+
+    def options_within(self, limits: Limits) -> dict[str, Any]:
+        """Options of the method under some limits."""
+        if not self.effort or limits.jerk is None:
+            return dict(self.options)
+        return {**self.options, "effort": float(f"{self.effort / limits.jerk**2:.5g}")}
 
 
 ROUGH = 1e-3
 """Tolerance of `joint`: half the iterations, for 0.2 % of the time."""
+SMOOTHER = 0.3
+"""Effort of the family that has one: enough to move its plans off the limits of jerk and snap."""
 FAMILIES = (
     Family("peak", "jerk"),
     Family("peak", "snap"),
     Family("joint", "jerk", {"pieces": 1, "tolerance": ROUGH}),
     Family("joint", "jerk", {"pieces": 2, "tolerance": ROUGH}),
+    Family("joint", "jerk", {"pieces": 1, "tolerance": ROUGH}, SMOOTHER),
 )
 """Where the search begins. Limits that `joint` holds all the time are touched by the spline of
 `peak` now and then: which of them flies faster depends on the course."""

@@ -110,7 +110,7 @@ class Trying:
         family = FAMILIES[candidate.family]
         module = methods.find(family.method)
         problem = self.problem_at(family, np.array(candidate.point), candidate.scale)
-        name = module.kernels(problem, module.Settings(**family.options))
+        name = module.kernels(problem, module.Settings(**family.options_within(problem.limits)))
         return "" if jit.is_ready(name) else name
 
     def trial(self, candidate: Candidate, scale: float) -> Trial | None:
@@ -126,7 +126,7 @@ class Trying:
         kind = FAMILIES[family]
         try:
             problem = self.problem_at(kind, point, scale)
-            answer = plan(problem, method=kind.method, **kind.options)
+            answer = plan(problem, method=kind.method, **kind.options_within(problem.limits))
         except PeakflightError:
             return None
         return answer if answer.feasible else None

@@ -221,7 +221,7 @@ def _best(
     spare: tuple[Plan, float, dict[str, Any]] | None = None
     for _, one, answer in planned:
         options = {"method": answer.method, "minimize": FAMILIES[one.family].minimize}
-        options |= FAMILIES[one.family].options
+        options |= FAMILIES[one.family].options_within(answer.problem.limits)
         worst, flew = work.judge(answer, conditions)
         if flew and worst <= work.error:
             return answer, worst, options
