@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from peakflight.document import Block, Picture, Points, Section, Table, as_code
+from peakflight.flight.controllers import BELIEVED_MASS
 from peakflight.flight.differences import ORDERS, POINTS, RATE
 from peakflight.limits import KINDS, plain_unit
 from peakflight.paper import DEFAULT_COURSE, RECONSTRUCTION, Reproduction, is_same
@@ -192,8 +193,8 @@ def _reasons(result: Reproduction, experiment: Experiment) -> tuple[str, ...]:
     else:
         kind = "another one"
     reasons = [
-        f"The course is not the paper's, which it does not print, but {kind}. An error in cm says "
-        "something about the paper's only as to its size.",
+        f"The course is not the paper's, which it does not print, but {kind}. Errors in cm "
+        "can be compared with the paper's only as to their size.",
         _vehicle(experiment),
         "The paper does not say which controller of the firmware flew, nor with which gains. Here "
         "it is one after `controller_mellinger.c` with the gains of the firmware. "
@@ -203,10 +204,10 @@ def _reasons(result: Reproduction, experiment: Experiment) -> tuple[str, ...]:
         "The beginning of the plan is known here, so a lag behind the plan counts as error. The "
         "paper does not say how it laid record and plan on each other; it says that the drone "
         '"starts to lag behind over time when very aggressive trajectories are used".',
-        f"Differences and means of {POINTS} flatten short peaks, so measured jerk and snap lie "
-        "below the plan's own; the table has the plan through the same filter. Noise they raise: "
+        f"Differences and means of {POINTS} flatten what is short, of plans as of flights; in the "
+        "table of peaks the plan through the same filter stands in brackets. Noise they raise: "
         f"{1e3 * NOISE:g} mm in each position would be {_noise_in_snap():.0f} m/s⁴ in each axis of "
-        "snap. Here there is none, in the paper's figures there is.",
+        "snap. Here there is none, in a record of motion capture there is.",
     ]
     if any(not one.flight.flew for each in experiment.comparisons for one in each.flown.values()):
         reasons.append(
@@ -252,10 +253,15 @@ def _height(experiment: Experiment) -> str:
     if not seen:
         return ""
     height = CENTIMETRES * float(np.mean(seen))
+    side = "high" if height >= 0.0 else "low"
+    believed = (
+        "That controller takes the mass and the rotors for others than they are. "
+        if experiment.vehicle.name in BELIEVED_MASS
+        else ""
+    )
     return (
-        "It takes the vehicle for another mass and the rotors for others than they are, and flies "
-        f"{abs(height):.1f} cm too {'high' if height >= 0.0 else 'low'} on average, which is part "
-        "of each error."
+        f"{believed}The vehicle flies {abs(height):.1f} cm too {side} on average, which is part of "
+        "each error."
     )
 
 

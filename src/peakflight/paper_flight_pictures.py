@@ -7,10 +7,11 @@ from peakflight.paper_flights import FlownComparison
 from peakflight.paper_pictures import Drawn
 
 CAPTIONS = {
-    "paths": "The paper's Fig. TrajRes, {}: flown trajectories; a cross, where one crashed.",
+    "paths": "The paper's Fig. TrajRes, {}: flown trajectories; a red cross where one crashed.",
     "derivatives": "The paper's Fig. DerRes, {}: motion derivatives of the flown positions by "
-    "differences and means of five; limits dashed.",
-    "errors": "The paper's Fig. Error, {}: distance from the plan while it lasts.",
+    "differences and means of five; limits dashed, a red cross when one crashed.",
+    "errors": "The paper's Fig. Error, {}: distance from the plan while it lasts; a red cross when "
+    "one crashed.",
 }
 
 

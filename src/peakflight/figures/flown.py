@@ -109,7 +109,7 @@ def _paths(lines: Sequence[_Line], title: str) -> Figure:
     waypoints = lines[0].flown.plan.problem.waypoints
     height = paper_height(paths, waypoints)
     figure = new_figure(height + 0.6 + LEGEND_TOP + LEGEND_ROW)
-    write_title(figure, f"{title}: flown paths", 0.12)
+    write_title(figure, f"{title}: paths", 0.12)
     draw_views(figure, paths, waypoints, height, side_width=SIDE_WIDTH)
     for line in _crashed(lines):
         x, y, _ = line.flown.analysis.positions[-1]
@@ -140,6 +140,7 @@ def _derivatives(lines: Sequence[_Line], title: str) -> Figure:
         if limit and kind.unit != "rad":
             shown = min(shown, CUT * limit)
         scale_panel(axes, kind, limit, times=(0.0, end), highest=shown)
+        _draw_crashes(axes, lines)
         unit = "°" if kind.unit == "rad" else plain_unit(kind.unit)
         _tell_higher(axes, max(tops), shown, unit)
     _name(figure, lines)
@@ -158,9 +159,7 @@ def _errors(lines: Sequence[_Line], title: str) -> Figure:
     tops = [float(values.max()) for values in errors]
     shown = max(_shown(lines, tops), 1e-9)
     axes.set(xlim=(0.0, _end(lines)), ylim=(0.0, HEADROOM * shown))
-    for line in _crashed(lines):
-        seen = line.flown.analysis
-        axes.plot(seen.times[-1], min(CENTIMETRES * seen.errors[-1], HEADROOM * shown), **CRASH)
+    _draw_crashes(axes, lines)
     axes.locator_params(axis="y", nbins=6)
     axes.set_xlabel("time (s)", fontsize=TEXT, color=INK)
     axes.set_ylabel("position error\n(cm)", fontsize=TEXT, color=INK)
@@ -172,6 +171,14 @@ def _errors(lines: Sequence[_Line], title: str) -> Figure:
 
 def _crashed(lines: Sequence[_Line]) -> Iterator[_Line]:
     return (line for line in lines if line.flown.crash is not None)
+
+
+def _draw_crashes(axes: Axes, lines: Sequence[_Line]) -> None:
+    """Mark when flights ended before their plans, across the panel."""
+    for line in _crashed(lines):
+        assert line.flown.crash is not None  # chosen by it
+        axes.axvline(line.flown.crash, color=line.style["color"], linestyle=":", linewidth=0.9)
+        axes.plot(line.flown.crash, 1.0, transform=axes.get_xaxis_transform(), **CRASH)
 
 
 def _end(lines: Sequence[_Line]) -> float:
