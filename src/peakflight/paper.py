@@ -242,7 +242,7 @@ def certified_plan(row: Row) -> Plan | None:
 
 def figures_csv(result: Reproduction) -> str:
     """Every figure that the paper prints, beside ours."""
-    return _csv(
+    return as_csv(
         ("comparison", "quantity", "unit", "paper", "ours"),
         ((one.printed.name, *figure) for one in result.comparisons for figure in one.beside_paper),
     )
@@ -267,7 +267,7 @@ def methods_csv(result: Reproduction) -> str:
         for one in result.comparisons
         for name, row in _as_dict(one)["methods"].items()
     )
-    return _csv(("comparison", "method", *columns), values)
+    return as_csv(("comparison", "method", *columns), values)
 
 
 def leg_times_csv(result: Reproduction) -> str:
@@ -281,7 +281,7 @@ def leg_times_csv(result: Reproduction) -> str:
                 yield (one.printed.name, leg, *cells)
 
     names = (GUESS, MELLINGER, PEAK, ALGORITHM_1, JOINT)
-    return _csv(("comparison", "leg", *(f"{name} [s]" for name in names)), lines())
+    return as_csv(("comparison", "leg", *(f"{name} [s]" for name in names)), lines())
 
 
 def _as_dict(one: PaperComparison) -> dict[str, Any]:
@@ -316,7 +316,8 @@ def _leg_times(row: Row) -> list[float] | None:
     return None if plan is None else np.diff(plan.waypoint_times).tolist()
 
 
-def _csv(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+def as_csv(columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Columns and rows as CSV; None leaves a cell empty."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,6 +42,9 @@ from peakflight.paper import (
 )
 from peakflight.version import __version__
 
+if TYPE_CHECKING:
+    from peakflight.paper_flights import Experiment
+
 NONE = "-"
 """What stands where there is no figure."""
 PICTURE_FORMATS = ("png", "svg")
@@ -55,12 +59,18 @@ TABLES = {
 
 
 def write_paper(
-    result: Reproduction, folder: Path, *, on_stage: Callable[[str], None] | None = None
+    result: Reproduction,
+    folder: Path,
+    *,
+    experiment: "Experiment | None" = None,
+    on_stage: Callable[[str], None] | None = None,
 ) -> tuple[list[str], tuple[str, ...]]:
     """Write pictures, tables and the page into a folder that exists.
 
     Parameters
     ----------
+    experiment
+        The flights, if they are to be on the page (`peakflight.paper_flights.fly_paper`).
     on_stage
         Told what begins.
 
@@ -75,43 +85,65 @@ def write_paper(
     """
     tell = on_stage or (lambda _: None)
     try:
-        pictures, names = _draw(result, folder, tell)
+        pictures, names = _draw(result, experiment, folder, tell)
         notes: tuple[str, ...] = ()
     except MissingExtra as error:
         pictures, names, notes = {}, [], (f"no pictures: {error}",)
     tell("writing the page")
-    page = paper_document(result, pictures, notes)
+    page = paper_document(result, pictures, notes, experiment=experiment)
+    values = json.dumps(as_dict(result, experiment), allow_nan=False, indent=1, ensure_ascii=False)
     contents = {
         "paper.html": as_html(page),
         "paper.md": as_markdown(page),
         **{name: table(result) for name, table in TABLES.items()},
-        "paper.json": json.dumps(result.to_dict(), allow_nan=False, indent=1, ensure_ascii=False)
-        + "\n",
+        "paper.json": f"{values}\n",
     }
+    if experiment is not None:
+        from peakflight.paper_flight_page import TABLES as FLIGHT_TABLES
+
+        contents |= {name: table(experiment) for name, table in FLIGHT_TABLES.items()}
     for name, content in contents.items():
         write_atomically(folder / name, content)
     return [*contents, *names], notes
 
 
+def as_dict(result: Reproduction, experiment: "Experiment | None" = None) -> dict[str, Any]:
+    """Plain numbers, lists and names, with those of the flights as "experiment"."""
+    values = result.to_dict()
+    return values if experiment is None else {**values, "experiment": experiment.to_dict()}
+
+
 def paper_document(
-    result: Reproduction, pictures: dict[str, tuple[Picture, ...]], notes: Iterable[str] = ()
+    result: Reproduction,
+    pictures: dict[str, tuple[Picture, ...]],
+    notes: Iterable[str] = (),
+    *,
+    experiment: "Experiment | None" = None,
 ) -> Document:
     """Say what was run, what came out, what the paper has, and why the two differ.
 
     Parameters
     ----------
     pictures
-        Those of "example", and of each comparison by its name.
+        Those of "example", of each comparison by its name, and of each as flown by its name after
+        "flown-".
     """
     sections = [_course_section(result), _example_section(result, pictures.get("example", ()))]
     sections += [
         _comparison_section(one, pictures.get(one.printed.name, ())) for one in result.comparisons
     ]
     sections.append(Section("Where and why the figures differ", (Points(_reasons(result)),)))
+    if experiment is not None:
+        from peakflight.paper_flight_page import flight_sections
+
+        names = [one.printed.name for one in result.comparisons]
+        flown = {name: pictures.get(f"flown-{name}", ()) for name in names}
+        sections += flight_sections(result, experiment, flown)
     if notes:
         sections.append(Section("Notes", (Points(tuple(notes)),)))
     return Document(
-        title="The paper's figures and tables of planning, run again",
+        title="The paper's figures and tables of planning"
+        + (", run again" if experiment is None else " and of its flights, run again"),
         lead='"An alternating peak-optimization method for optimal trajectory generation of '
         'quadrotor drones" (de Vries, Li, Song, Sun). This page was made by `peakflight paper`, '
         f"version {__version__}. What the paper prints stands beside what came out here.",
@@ -156,7 +188,10 @@ def methods_table(one: PaperComparison) -> Table:
 
 
 def _draw(
-    result: Reproduction, folder: Path, tell: Callable[[str], None]
+    result: Reproduction,
+    experiment: "Experiment | None",
+    folder: Path,
+    tell: Callable[[str], None],
 ) -> tuple[dict[str, tuple[Picture, ...]], list[str]]:
     """Draw and write every picture; by part of the page, and the names of files."""
     from peakflight.figures import write_figure
@@ -164,6 +199,11 @@ def _draw(
 
     parts = {"example": example_pictures(result)}
     parts |= {one.printed.name: comparison_pictures(one) for one in result.comparisons}
+    if experiment is not None:
+        from peakflight.paper_flight_pictures import flight_pictures
+
+        for flown in experiment.comparisons:
+            parts[f"flown-{flown.comparison.printed.name}"] = flight_pictures(flown)
     pictures, names = {}, []
     for part, drawings in parts.items():
         found = []

@@ -18,6 +18,7 @@ from peakflight.figures.course import course_figure
 from peakflight.figures.derivatives import derivatives_figure
 from peakflight.figures.differences import differences_figure
 from peakflight.figures.flights import Flight, in_sequence, side_by_side
+from peakflight.figures.flown import FlownPlan, flown_figures
 from peakflight.figures.leg_times import leg_times_figure
 from peakflight.figures.motion_capture import motion_capture_figures
 from peakflight.figures.overlaid_derivatives import overlaid_derivatives_figure
@@ -29,10 +30,12 @@ from peakflight.figures.yaw import yaw_figure
 
 __all__ = [
     "Flight",
+    "FlownPlan",
     "comparison_figures",
     "course_figure",
     "derivatives_figure",
     "differences_figure",
+    "flown_figures",
     "in_sequence",
     "leg_times_figure",
     "motion_capture_figures",
