@@ -503,13 +503,13 @@ class TestVehicles:
         assert result.exit_code == 0
         planned = json.loads(result.stdout)
         assert planned["problem"]["vehicle"]["mass"] == 0.95
-        assert planned["limits"]["thrust_acceleration"] == pytest.approx(27.51 * 0.85 / 0.95, 1e-3)
+        assert planned["limits"]["thrust_acceleration"] == pytest.approx(24.27 * 0.85 / 0.95, 1e-3)
 
     def test_compare_keeps_the_limits_of_the_vehicle(self, run: Run) -> None:
         options = ("--vehicle", "racing-quad", "--methods", "proportional")
         result = run("compare", "lap.csv", *options)
         assert result.exit_code == 0
-        assert "limits (of racing-quad): thrust_acceleration=27.51" in result.stdout
+        assert "limits (of racing-quad): thrust_acceleration=24.27" in result.stdout
         values = json.loads(run("compare", "lap.csv", *options, "--json").stdout)
         assert values["vehicle"]["name"] == "racing-quad"
 
@@ -544,7 +544,7 @@ class TestVehicles:
         assert all(name in listed.stdout for name in pf.VEHICLES)
         one = run("vehicles", "racing-quad")
         assert one.exit_code == 0
-        for words in ("0.85 kg", "uzh-rpg/rpg_time_optimal", "15% below the vehicle's own limit"):
+        for words in ("0.85 kg", "uzh-rpg/rpg_time_optimal", "25% below the vehicle's own limit"):
             assert words in " ".join(one.stdout.split())
         unknown = run("vehicles", "hummingbird").stdout
         assert "unknown" in unknown

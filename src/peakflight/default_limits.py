@@ -87,8 +87,6 @@ def default_limits(
     turned = rate * thrust
     changed = (thrust - lowest) / motor_lag if motor_lag > 0.0 else math.inf
     limits = Limits(
-        # Limits on the rotors themselves belong here: rotor_thrust=most, least_rotor_thrust=least,
-        # airframe=airframe.
         speed=_below(DRAG * 4.0 * most / drag) if drag > 0.0 else None,
         thrust_acceleration=thrust,
         least_thrust_acceleration=lowest,

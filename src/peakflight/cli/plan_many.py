@@ -110,7 +110,7 @@ def plan_many(
     \b
     Example:
       peakflight plan-many courses/ --limits speed=5,jerk=62,tilt=50deg -o plans
-      peakflight plan-many courses/ --limits speed=5,jerk=62,tilt=50deg -o plans --resume
+      peakflight plan-many courses/ --limits speed=5,jerk=62 -o plans --resume
     """  # noqa: D301
     from peakflight.batch import plan_many as run
 

@@ -107,7 +107,7 @@ def tune(
 
     \b
     Example:
-      peakflight tune course.csv --vehicle crazyflie-2.1-upgrade --error 0.15 -o tuned
+      peakflight tune course.csv --vehicle crazyflie-2.1-upgrade -o tuned
       peakflight fly tuned/plan.json --controller firmware --spread 200
     """  # noqa: D301
     if not (math.isfinite(budget) and budget > 0.0):

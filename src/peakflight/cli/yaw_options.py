@@ -52,7 +52,8 @@ def written_yaw(heading: Heading) -> str:
         asked = f"{math.degrees(heading.angle):.6g} deg"
     elif heading.point is not None:
         asked = POINT + ",".join(f"{value:g}" for value in heading.point)
-    limits = [f"{kind.name}={value:.6g}" for kind, value in heading.limits.items()]
+    names = {kind: name for name, kind in zip(FIELDS, ABOUT["yaw"], strict=True)}
+    limits = [f"{names.get(kind, kind.name)}={limit:.6g}" for kind, limit in heading.limits.items()]
     return f"{asked}; limits: {','.join(limits) or 'none'}"
 
 
