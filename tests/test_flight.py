@@ -170,9 +170,14 @@ def test_a_crash_says_why_and_when(cause, height, world):
     assert not flight.within(100.0)
 
 
-def test_there_is_no_ground_for_a_plan_that_goes_below_it():
+def test_the_ground_lies_below_a_plan_that_goes_below_it():
     low = path((0, 0, 0.3), (1.0, 0, -0.3), (0, 0, 0.3))
     assert pf.fly(low, vehicle=RACER).flew
+    near = path((0, 0, 0.04), (1.0, 0, 0.3), (0, 0, 0.04))
+    assert pf.fly(near, vehicle=RACER).flew
+    sunk = pf.fly(near, vehicle=RACER, conditions=pf.Conditions(thrust_scale=0.6))
+    assert sunk.crash.cause == "hit the ground"
+    assert -0.1 < sunk.position[-1, 2] < -0.01
     heavy = pf.Conditions(thrust_scale=0.4)
     settings = pf.FlySettings(ground=-0.5)
     flight = pf.fly(low, vehicle=RACER, conditions=heavy, settings=settings)

@@ -203,6 +203,8 @@ def _print(
     out.line(f"{course}, {result.vehicle.name}: {_found(result)}", "title")
     for note in notes:
         out.line(f"note: {note}")
+    if plan is not None and not result.stood_doubts:
+        out.line("note: no plan has stood vehicles that differ a little; this one stood the search")
     ended = "" if result.complete else ", until the budget was spent"
     out.line(f"{result.plans} plans flown in {result.seconds:.1f} s{ended}")
     if plan is not None and result.limits is not None:

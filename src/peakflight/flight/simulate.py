@@ -60,10 +60,10 @@ class FlySettings:
     """Hovering at the end of a plan that ends at rest, s: a vehicle that passes the end upside down
     has not flown it."""
     ground: float | None = 0.0
-    """Height of the ground, m; None for none. It is not looked at for a plan that itself comes
-    nearer to it than `clearance`."""
+    """Height of the ground, m; None for none."""
     clearance: float = 0.05
-    """m."""
+    """Least distance of a plan from the ground, m: where it comes nearer, or goes below, the ground
+    is so far below its lowest point."""
     lost_distance: float = 1.0
     """Distance from the plan that counts as a crash, m."""
     lost_angle: float = math.radians(120.0)
@@ -245,11 +245,11 @@ def prepare(
 
 
 def _ground(rehearsal: Rehearsal, settings: FlySettings) -> float:
-    """Height of the ground, m; minus infinity if there is none."""
+    """Height of what a flight may not fall below, m; minus infinity if there is no ground."""
     lowest = float(rehearsal.rows[:, rows.PLANNED_POSITION + 2].min())
-    if settings.ground is None or lowest < settings.ground + settings.clearance:
+    if settings.ground is None:
         return -math.inf
-    return settings.ground
+    return min(settings.ground, lowest - settings.clearance)
 
 
 def run(task: Task, conditions: Conditions) -> Outcome:

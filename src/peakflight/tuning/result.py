@@ -43,7 +43,10 @@ class TuneResult:
     rms_error: float | None
     """Of the plan, flown as the figures say, m."""
     worst_error: float | None
-    """Of the plan, of the worst of all vehicles that it was flown with, m."""
+    """Of the plan, of the worst of the vehicles that it has stood, m."""
+    stood_doubts: bool
+    """Whether it has stood the vehicles that differ a little, by which plans are told from lucky
+    ones in the end; if not, none had when the time was up."""
     options: dict[str, Any]
     """Of `peakflight.plan`, beside the limits: with them it makes the same plan again."""
     front: Sequence[Point]
@@ -74,6 +77,7 @@ class TuneResult:
             "error": self.error,
             "rms_error": self.rms_error,
             "worst_error": self.worst_error,
+            "stood_doubts": self.stood_doubts,
             "plans": self.plans,
             "robust": self.robust,
             "seconds": self.seconds,

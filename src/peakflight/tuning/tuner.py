@@ -154,6 +154,7 @@ def tune(
         error=error,
         rms_error=None if best is None else work.judge(best[0], (Conditions(),))[0],
         worst_error=None if best is None else best[1],
+        stood_doubts=best is not None and best[3],
         options={} if best is None else best[2],
         front=_front(search),
         plans=len(search.trials),
@@ -194,10 +195,11 @@ def _problem(
 
 def _best(
     search: Search, settings: TuneSettings, deadline: float
-) -> tuple[Plan, float, dict[str, Any]] | None:
-    """The fastest plan that stands a close look, and its worst error.
+) -> tuple[Plan, float, dict[str, Any], bool] | None:
+    """The fastest plan that stands a close look, its worst error, options, and whether it does.
 
-    Of each proportions the fastest is looked at, then slower ones.
+    Of each proportions the fastest is looked at, then slower ones. After the deadline, or if none
+    stands it, it is the slowest that has stood the search.
     """
     work = search.work
     spread = settings.final_spread
@@ -218,17 +220,18 @@ def _best(
         if answer is not None:
             planned.append((answer.duration, one, answer))
     planned.sort(key=lambda entry: entry[0])
-    spare: tuple[Plan, float, dict[str, Any]] | None = None
+    spare: tuple[Plan, float, dict[str, Any], bool] | None = None
     for _, one, answer in planned:
+        if spare is not None and time.perf_counter() > deadline:
+            break
         options = {"method": answer.method, "minimize": FAMILIES[one.family].minimize}
         options |= FAMILIES[one.family].options_within(answer.problem.limits)
         worst, flew = work.judge(answer, conditions)
         if flew and worst <= work.error:
-            return answer, worst, options
-        if spare is None or time.perf_counter() < deadline:
-            plain, flew = work.judge(answer, work.conditions)
-            if flew and plain <= work.error:
-                spare = (answer, plain, options)  # the slowest one so far: furthest from the border
+            return answer, worst, options, True
+        plain, flew = work.judge(answer, work.conditions)
+        if flew and plain <= work.error:
+            spare = (answer, plain, options, False)  # the slowest so far: furthest from the border
     return spare
 
 
