@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from peakflight.kernels.jit import kernel
 from peakflight.limits import GRAVITY, KINDS, ROTORS
 from peakflight.trajectory import Trajectory
 from peakflight.twist import turning_about_z, untwisted
-from peakflight.twist_certificate import TOLERANCE, certify_twist
+from peakflight.twist_certificate import TOLERANCE, _cut, certify_twist
 from peakflight.vehicle import Vehicle
 from peakflight.yaw import BODY_KINDS
 
@@ -250,6 +251,58 @@ def test_the_bound_is_what_the_formula_gives_at_the_worst_heading():
     share = RACER.mass * GRAVITY / 4.0
     turning = RACER.inertia[2] * spin / (4.0 * RACER.torque_per_thrust)
     assert peaks["rotor_thrust"] == pytest.approx((share + turning) / RACER.rotor_thrust[1])
+
+
+@pytest.mark.parametrize(
+    "coefficients", [[0.0, 0.0, 1e308, -1e308], [0.0, 0.0, 1e300, -1e300]], ids=str
+)
+def test_a_yaw_beyond_numbers_is_not_proven(coefficients):
+    rest = pf.plan([[0, 0, 1], [1, 0, 1]], vehicle=RACER, method="proportional")
+    slow = rest.trajectory.stretch(4.0 / rest.duration)
+    heading = pf.Heading(policy="free", rate=None, acceleration=20.0)
+    problem = replace(rest.problem, yaw=heading)
+    yaw = Trajectory(np.array(coefficients)[None, :, None], [slow.duration])
+    with np.errstate(over="ignore", invalid="ignore"):
+        peaks, problems = certify_twist(problem, heading, yaw, slow)
+    assert peaks["angular_acceleration_z"].max() > 1e6
+    assert peaks["rotor_thrust"].max() > 1.0
+    assert problems
+
+
+def test_a_segment_too_short_for_a_part_of_the_yaw_is_not_proven():
+    """Its borders are the same, as far as times are told apart."""
+    coefficients = np.zeros((3, 4, 3))
+    coefficients[:, 2, 0] = 2.5
+    coefficients[1, 3, 1] = 1e3
+    flight = Trajectory(coefficients, [1000.0, 1.5e-9, 1000.0])
+    heading = pf.Heading(policy="free")
+    problem = pf.Problem(WAYPOINTS, vehicle=RACER, yaw=heading)
+    yaw = Trajectory(np.zeros((2, 1, 1)), [1000.0, flight.duration - 1000.0])
+    peaks, problems = certify_twist(problem, heading, yaw, flight)
+    assert peaks["body_rate_z"][1] > 1.0
+    assert problems
+
+
+@pytest.mark.parametrize("degree", [5, 7, 11])
+def test_a_cut_yaw_is_wrong_by_no_more_than_is_said(degree):
+    chebyshev = np.polynomial.chebyshev.Chebyshev.basis(degree, domain=[0.0, 1.0])
+    powers = chebyshev.convert(kind=np.polynomial.Polynomial, domain=[-1, 1], window=[-1, 1]).coef
+    yaw = Trajectory(powers[None, :, None], [1.0])
+    parts, lost = _cut(yaw, np.array([0.73]))
+    offset = Fraction(float(parts.breakpoints[1]))
+    for order in (1, 2):
+        for place in np.linspace(0.0, 0.27, 28):
+            exact = sum(
+                math.perm(j, order) * Fraction(float(c)) * (offset + Fraction(place)) ** (j - order)
+                for j, c in enumerate(powers)
+                if j >= order
+            )
+            shifted = sum(
+                math.perm(j, order) * Fraction(float(c)) * Fraction(place) ** (j - order)
+                for j, c in enumerate(parts.coefficients[1, :, 0])
+                if j >= order
+            )
+            assert abs(exact - shifted) <= lost[1, order - 1]
 
 
 @pytest.mark.parametrize(

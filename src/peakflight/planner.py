@@ -159,11 +159,13 @@ def _answered(
     """Solve a problem and add its yaw.
 
     What turning about z takes of the rotors, the method does not know. Where they lack it, the
-    problem is solved again within so much less of their range, and the fastest flight is taken.
+    problem is solved again within so much less of their range, and the fastest flight is taken. A
+    time limit is for all of it.
     """
+    began = time.perf_counter()
     outcome = module.solve(problem, settings)
     answers = [_with_yaw(problem, outcome)]
-    narrow = problem
+    narrow, limit = problem, getattr(settings, "time_limit", None)
     for _ in range(RESERVES):
         lacking = answers[-1][1].lacking
         longer = answers[-1][1].trajectory.duration / outcome.trajectory.duration
@@ -171,7 +173,13 @@ def _answered(
             break
         spared = {name: EASED * demand for name, demand in lacking.items()}
         narrow = replace(narrow, limits=narrow.limits.sparing(spared))
+        if limit is not None:
+            rest = limit - (time.perf_counter() - began)
+            if rest <= 0.0:
+                break
+            settings = replace(settings, time_limit=rest)
         outcome = module.solve(narrow, settings)
+        outcome = replace(outcome, iterations=outcome.iterations + answers[-1][0].iterations)
         answers.append(_with_yaw(problem, outcome))
     return min(
         answers,

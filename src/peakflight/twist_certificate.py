@@ -19,9 +19,9 @@ TOLERANCE = 1e-6
 """Largest distance of a bound from what is reached, relative to the limit or to that value."""
 SAME_TIME = 1e-12
 """Difference of two times that counts as none, relative to the duration."""
-SHIFTED = 32.0 * 2.220446049250313e-16
+SHIFTED = 64.0 * 2.220446049250313e-16
 """Error of a derivative of a polynomial that is written around another time, relative to the sum of
-its terms' sizes."""
+the sizes that its terms had around the first one: each is a sum of at most twelve products."""
 
 
 def certify_twist(
@@ -77,7 +77,7 @@ def _bounds(
     borders = flight.breakpoints[1:-1]
     nearest = np.searchsorted(0.5 * (yaw.breakpoints[1:] + yaw.breakpoints[:-1]), borders)
     is_new = np.abs(yaw.breakpoints[nearest] - borders) > slack
-    parts = yaw.cut(borders[is_new])
+    parts, lost = _cut(yaw, borders[is_new])
     ends = 0.5 * (parts.breakpoints[1:] + parts.breakpoints[:-1])
     firsts = np.concatenate(([0], np.searchsorted(ends, borders), [len(parts)]))
     coefficients = np.zeros((len(parts), parts.degree + 1, 3))
@@ -90,7 +90,7 @@ def _bounds(
         fresh(flight.segment_times),
         coefficients,
         fresh(parts.segment_times),
-        _lost(parts, is_shifted=bool(is_new.any()), factorials=factorials),
+        lost,
         firsts.astype(np.int64),
         figures,
         allowed,
@@ -102,14 +102,21 @@ def _bounds(
     return upper
 
 
-def _lost(parts: Trajectory, *, is_shifted: bool, factorials: np.ndarray) -> np.ndarray:
-    """(M, 2) largest errors of the yaw's rate and acceleration from writing it in other parts."""
+def _cut(yaw: Trajectory, times: np.ndarray) -> tuple[Trajectory, np.ndarray]:
+    """The yaw with joints at (n,) s more, and (M, 2) largest errors of rate and acceleration by it.
+
+    Writing a polynomial around another time rounds in proportion to what its terms come to at the
+    end of the piece, taken positive, however much of that cancels.
+    """
+    parts = yaw.cut(times)
     lost = np.zeros((len(parts), 2))
-    if is_shifted:
-        sizes = np.abs(parts.coefficients[:, :, 0])
-        powers = np.arange(parts.degree + 1.0)
+    if len(times) > 0:
+        parent = np.searchsorted(yaw.breakpoints[1:-1], parts.breakpoints[:-1], side="right")
+        sizes = np.abs(yaw.coefficients[parent, :, 0])
+        powers = np.arange(yaw.degree + 1.0)
+        factorials = falling_factorials(yaw.degree)
         for order in (1, 2):
-            terms = parts.segment_times[:, None] ** (powers[order:] - order)
-            row = factorials[order, order : parts.degree + 1]
-            lost[:, order - 1] = SHIFTED * (row * sizes[:, order:] * terms).sum(axis=1)
-    return lost
+            terms = yaw.segment_times[parent, None] ** np.maximum(powers - order, 0.0)
+            row = factorials[order, : yaw.degree + 1]
+            lost[:, order - 1] = SHIFTED * (row * sizes * terms).sum(axis=1)
+    return parts, lost

@@ -3,7 +3,7 @@
 Nothing here is shared with what makes the motion. If a yaw has degree 3 at most, the largest rate
 of a piece is at an end or at the one vertex, and the largest acceleration at an end; the rounding
 error of each value is bounded and added. Limits that are about the body take the flight as well:
-`twist_certificate` proves them, for any degree.
+`twist_certificate` proves them, for any degree that flights have.
 """
 
 import numpy as np
@@ -16,6 +16,8 @@ from peakflight.yaw import Heading
 
 DEGREE = 3
 """Highest of a yaw motion of which limits on its own rate and acceleration can be proven."""
+HIGHEST = 11
+"""Highest of one under limits about the body."""
 ROUNDING = 16.0 * 2.220446049250313e-16
 """Error of a value of degree 3 or a derivative of it, relative to the sum of its terms' sizes."""
 JUMP_OF_LIMIT = 1e-4
@@ -85,8 +87,9 @@ def unfit(heading: Heading, yaw: Trajectory | None, flight: Trajectory) -> str:
     """Why nothing can be proven about a yaw motion; empty if something can."""
     if yaw is None:
         return "there is no yaw motion"
-    if yaw.degree > DEGREE and not heading.is_about_body:
-        return f"the yaw has degree {yaw.degree}; {DEGREE} is the most that can be proven"
+    most = HIGHEST if heading.is_about_body else DEGREE
+    if yaw.degree > most:
+        return f"the yaw has degree {yaw.degree}; {most} is the most that can be proven"
     slack = TIME_TOLERANCE * flight.duration
     ends = np.array([yaw.start_time - flight.start_time, yaw.end_time - flight.end_time])
     if not np.abs(ends).max() <= slack:

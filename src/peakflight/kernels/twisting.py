@@ -105,6 +105,8 @@ def largest(
     sizes = np.zeros(4)
     for k in range(durations.size):
         bounds[:] = 0.0
+        if firsts[k] == firsts[k + 1]:  # no yaw, nothing proven
+            bounds[1] = np.inf
         if not control_columns(
             coefficients, k, durations[k], figures[1], gravity, tables[0], tables[1], points, whole,
             errors, sizes,
@@ -195,6 +197,8 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
         return False
     for order in range(2):
         lost = turned[order, 0] + (degree * nesting + 16.0) * EPSILON * turned[order, 1]
+        if not lost < np.inf:
+            return False
         keep(lines, TWIST + order, drawn(stack, row, 12 + order, degree, lost))
     tilting = times(line(lines, RATE + 2), rise)
     twist = plus(line(lines, TWIST), negative(tilting))
@@ -207,6 +211,10 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
     for d in range(3):
         swung = times(pull, line(lines, SWING + d))
         keep(lines, TORQUE + d, plus(line(lines, TURN + d), swung))
+    for i in range(ROWS):  # what is not a number would be lost among the maxima below
+        for part in range(3):
+            if not abs(lines[i, part]) < np.inf:
+                return False
     return True
 
 
