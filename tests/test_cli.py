@@ -94,6 +94,8 @@ def shell(*arguments: object, code: str | None = None, **options: object) -> sub
         text=True,
         encoding="utf-8",
         env={**os.environ, "PYTHONIOENCODING": "utf-8"},
+        # what is started in the background of a shell ignores Ctrl-C
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads
         **options,
     )
 

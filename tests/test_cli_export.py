@@ -80,7 +80,8 @@ def test_a_show_of_two(run: Run) -> None:
 
 
 def test_no_refit_that_breaks_a_limit_ends_with_1(run: Run) -> None:
-    fine = pf.plan([[0, 0, 1], [0.3, 0, 1], [0.3, 0.3, 1]], vehicle="crazyflie-2.1", pieces=4)
+    limits = pf.Limits(speed=5.0, thrust_acceleration=12.4, jerk=300.0, snap=9000.0)
+    fine = pf.plan([[0, 0, 1], [0.3, 0, 1], [0.3, 0.3, 1]], limits=limits, pieces=4)
     fine.save("fine.json")
     result = run("export", "fine.json", "--to", "skyc", "--no-refit")
     assert result.exit_code == 1
