@@ -1,11 +1,14 @@
 """Generated scripts, run dry: the real libraries where there are any, over recorded links."""
 
+import ast
 import asyncio
 import importlib.util
 import io
+import re
 import sys
 import types
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -14,6 +17,8 @@ import numpy as np
 import pytest
 
 import peakflight as pf
+from peakflight.formats import FLIGHT_FORMATS
+from peakflight.limits import KINDS
 
 WAYPOINTS = [[0.0, 0.0, 1.0], [0.8, 0.4, 1.2], [1.2, 1.0, 0.9]]
 
@@ -434,3 +439,41 @@ def test_ardupilot_script_lands_if_it_is_refused(
     fly_ardupilot(module, vehicle)
     assert vehicle.modes == ["GUIDED", "LAND"]
     assert "the vehicle refuses command 22" in capsys.readouterr().out
+
+
+# ---- what the header of a script says -----------------------------------------------------------
+
+SCRIPTS = ("cflib", "cflib-compressed", "crazyswarm2", "px4", "ardupilot")
+
+
+def docstring(path: Path) -> str:
+    return ast.get_docstring(ast.parse(path.read_text())) or ""
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("called", ['q""";print("INJECTED");"""', "ends in \\", "$name ${x}"])
+def test_a_vehicles_name_stays_text(name: str, called: str, plan: pf.Plan, tmp_path: Path) -> None:
+    assert plan.vehicle is not None
+    problem = replace(plan.problem, vehicle=replace(plan.vehicle, name=called))
+    path = tmp_path / "fly.py"
+    pf.export(replace(plan, problem=problem), to=name, path=path)
+    values = [
+        node.value for node in ast.walk(ast.parse(path.read_text())) if type(node) is ast.Expr
+    ]
+    printed = [ast.unparse(call) for call in values if isinstance(call, ast.Call)]
+    assert not any("INJECTED" in call for call in printed)
+    assert f"for {re.sub('[^a-zA-Z .]', '_', called)}; planned" in docstring(path)
+    (reading,) = FLIGHT_FORMATS[name].decode(path.read_bytes())
+    assert reading.trajectory.duration == pytest.approx(plan.duration, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_names_the_limits_that_it_is_held_to(
+    name: str, plan: pf.Plan, tmp_path: Path
+) -> None:
+    (flight,) = pf.export(plan, to=name, path=tmp_path / "fly.py").flights
+    said = docstring(tmp_path / "fly.py")
+    assert "certified" not in said
+    named = {kind.name for kind in KINDS if re.search(rf"[:,] {kind.label} \d", said)}
+    assert named == set(flight.held)
+    assert ("jerk" in named) == (name in ("cflib", "crazyswarm2"))

@@ -69,7 +69,7 @@ def _encoded(template: str, plan: Plan) -> Encoded:
     rows = set_points(plan)
     text = script(
         template,
-        described=described(plan),
+        described=described(plan, SET_POINTS),
         set_points=rows_text(rows),
         height=f"{max(HEIGHT, float(plan.trajectory.coefficients[0, 0, 2])):.9g}",
     )
