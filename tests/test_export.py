@@ -35,7 +35,7 @@ def plan() -> pf.Plan:
 
 @pytest.fixture(scope="module")
 def long_plan() -> pf.Plan:
-    """Of 40 pieces, more than a Crazyflie has room for."""
+    """Of more pieces than a Crazyflie has room for."""
     made = pf.plan(course("pmm_slalom.json"), vehicle="crazyflie-2.1")
     assert len(made.trajectory) > 31
     return made
@@ -56,8 +56,14 @@ def stated(name: str, plan: pf.Plan) -> float:
 @pytest.mark.parametrize("path", PUBLIC, ids=lambda path: path.name)
 def test_every_format_is_within_its_precision_and_tolerance(path: Path, tmp_path: Path) -> None:
     """All public courses for the stock Crazyflie: the files say themselves how exact they are."""
-    flown = pf.plan(pf.tidy(read_course(path))[0].waypoints, vehicle="crazyflie-2.1")
+    waypoints = pf.tidy(read_course(path))[0].waypoints
+    flown = pf.plan(waypoints, vehicle="crazyflie-2.1")
+    underground = flown.trajectory.sample(2000)[..., 2].min() < -0.01
     for name, chosen in FLIGHT_FORMATS.items():
+        if chosen.from_ground and underground:
+            with pytest.raises(pf.InvalidProblem, match=r"the plan goes down to z = -"):
+                pf.export(flown, to=name, path=tmp_path / chosen.filename)
+            continue
         if name in ON_CRAZYFLIE and len(flown.pieces) > 31:
             with pytest.raises(pf.InvalidProblem, match=r"each of its 100 legs needs one"):
                 pf.export(flown, to=name, path=tmp_path / chosen.filename)
@@ -139,7 +145,9 @@ def test_refit_says_what_it_costs(long_plan: pf.Plan, tmp_path: Path) -> None:
     assert flight.plan_pieces == len(long_plan.trajectory)
     assert 0.0 < flight.cost <= MOST_TIME_LOST
     assert flight.rounding.position < 1e-5 < flight.difference.position
-    assert report.notes[0].startswith("planned again with 31 pieces in place of 40: 0.")
+    assert report.notes[0].startswith(
+        f"planned again with 31 pieces in place of {len(long_plan.trajectory)}: 0."
+    )
     for point in long_plan.problem.waypoints:
         times = flight.trajectory.breakpoints
         assert np.linalg.norm(flight.trajectory(times) - point, axis=1).min() < 1e-5
@@ -157,9 +165,11 @@ def test_refit_meets_the_effort_of_a_smooth_plan(tmp_path: Path) -> None:
 
 def test_no_refit_refuses_or_reports(long_plan: pf.Plan, tmp_path: Path) -> None:
     with pytest.raises(
-        pf.InvalidProblem, match=r"40 pieces; there is room for 31; plan with fewer"
+        pf.InvalidProblem, match=r"\d pieces; there is room for 31; plan with fewer"
     ):
-        pf.export(long_plan, to="cflib", path=tmp_path / "c.csv", refit=False)
+        pf.export(
+            translated(long_plan, [0.0, 0.0, 1.0]), to="cflib", path=tmp_path / "c.csv", refit=False
+        )
     report = pf.export(long_plan, to="skyc", path=tmp_path / "c.skyc", refit=False)
     assert not report.feasible
     assert "1.01 is allowed for rounding" in report.problems[0]
@@ -189,11 +199,16 @@ def test_a_reading_beyond_its_limits_is_found(plan: pf.Plan) -> None:
 # ---- several drones ---------------------------------------------------------------------------
 
 
+def translated(plan: pf.Plan, offset: list[float]) -> pf.Plan:
+    problem = replace(plan.problem, waypoints=plan.problem.waypoints + np.array(offset))
+    return replace(plan, problem=problem, trajectory=plan.trajectory.translate(offset))
+
+
 def test_a_show_keeps_paths_steps_and_delays(plan: pf.Plan, tmp_path: Path) -> None:
-    late = replace(plan, trajectory=plan.trajectory.translate([2.0, 0.0, 0.0]).shift(1.5))
-    late = replace(late, yaw_motion=plan.yaw_motion.shift(1.5))
-    moved = late.problem.waypoints + np.array([2.0, 0.0, 0.0])
-    late = replace(late, problem=replace(late.problem, waypoints=moved))
+    late = translated(plan, [2.0, 0.0, 0.0])
+    late = replace(
+        late, trajectory=late.trajectory.shift(1.5), yaw_motion=plan.yaw_motion.shift(1.5)
+    )
     for name in ("skyc", "ros2"):
         report = pf.export([plan, late], to=name, path=tmp_path / "show", names=["a", "b"])
         first, second = report.flights
@@ -214,8 +229,11 @@ def test_stretched_shows_stay_in_step(plan: pf.Plan) -> None:
 
 
 def test_shows_are_not_planned_again(long_plan: pf.Plan, tmp_path: Path) -> None:
-    with pytest.raises(pf.InvalidProblem, match=r"plan 1: the flight has 40 pieces"):
-        pf.export([long_plan, long_plan], to="crazyswarm2", path=tmp_path / "fly.py")
+    above = translated(long_plan, [0.0, 0.0, 1.0])
+    with pytest.raises(
+        pf.InvalidProblem, match=rf"plan 1: the flight has {len(above.trajectory)} pieces"
+    ):
+        pf.export([above, above], to="crazyswarm2", path=tmp_path / "fly.py")
 
 
 # ---- bad input --------------------------------------------------------------------------------
@@ -247,6 +265,36 @@ def test_bad_input_is_one_clear_error(plan: pf.Plan, tmp_path: Path) -> None:
 def test_a_plan_that_is_not_proven_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
     fast = replace(plan, trajectory=plan.trajectory.stretch(0.5))
     refused(r"the plan is not proven to keep its limits: thrust", fast, tmp_path / "f", to="px4")
+
+
+HOVERING = ("cflib", "cflib-compressed", "crazyswarm2", "px4", "ardupilot", "skyc")
+
+
+def test_a_flight_that_begins_or_ends_in_motion_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
+    first, second = plan.trajectory.split(0.5 * plan.duration)
+    speed = np.linalg.norm(second(second.start_time, 1))
+    for part, end in ((first, "ends"), (second.shift(-second.start_time), "begins")):
+        waypoints = np.array([part(part.start_time), part(part.end_time)])
+        moving = replace(
+            plan,
+            problem=replace(plan.problem, waypoints=waypoints),
+            trajectory=part,
+            yaw_motion=None,
+        )
+        for name in HOVERING:
+            with pytest.raises(pf.InvalidProblem, match=rf"the plan {end} at {speed:.3g} m/s") as e:
+                pf.export(moving, to=name, path=tmp_path / "f")
+            assert "hovers before and after; the plan must begin and end at rest" in str(e.value)
+
+
+def test_a_script_that_would_go_underground_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
+    lowest = float(plan.trajectory.sample(2000)[..., 2].min())
+    on_ground, under = (translated(plan, [0.0, 0.0, h - lowest]) for h in (0.0, -0.25))
+    for name in HOVERING[:-1]:
+        words = r"the plan goes down to z = -0\.25 m at .* z is above where the vehicle starts"
+        refused(words, under, tmp_path / "f", to=name)
+    for made, name in ((under, "skyc"), (on_ground, "px4")):
+        assert pf.export(made, to=name, path=tmp_path / name).feasible
 
 
 def test_what_is_too_far_out_is_refused(tmp_path: Path) -> None:

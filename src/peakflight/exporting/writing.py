@@ -13,6 +13,7 @@ from peakflight.exporting.report import (
     jumps,
     yaw_difference,
 )
+from peakflight.exporting.whole_flight import check_whole_flight
 from peakflight.files import PathLike, write_atomically
 from peakflight.formats.flight_files import FlightFormat, Reading, find_format
 from peakflight.result import Plan
@@ -53,7 +54,8 @@ def export(
     ------
     InvalidProblem
         If the format is unknown or cannot hold the flight, a plan is not proven to keep its
-        limits, or a vehicle is missing; the message says which.
+        limits, begins or ends in motion or goes underground where the file flies from the ground
+        and back, or a vehicle is missing; the message says which.
     InvalidFile
         If the file cannot be written.
     MissingExtra
@@ -106,6 +108,7 @@ def _check(name: str, chosen: FlightFormat, plans: Sequence[Plan]) -> None:
                 f"format {name} needs a vehicle, and {which} has none; plan with vehicle=... "
                 "(--vehicle)"
             )
+        check_whole_flight(name, chosen, which, plan)
         proof = certify_plan(plan)
         if not proof.feasible:
             raise InvalidProblem(f"{which} is not proven to keep its limits: {proof.problems[0]}")

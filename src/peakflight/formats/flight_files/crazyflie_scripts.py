@@ -116,6 +116,8 @@ CFLIB = FlightFormat(
     decode=decode_cflib,
     precision=crazyswarm.FORMAT.precision,
     tolerance=crazyswarm.FORMAT.tolerance,
+    from_rest=True,
+    from_ground=True,
     most_pieces=crazyswarm.room,
 )
 CFLIB_COMPRESSED = FlightFormat(
@@ -129,6 +131,8 @@ CFLIB_COMPRESSED = FlightFormat(
     precision=compressed.FORMAT.precision,
     tolerance=compressed.FORMAT.tolerance,
     coarse=True,
+    from_rest=True,
+    from_ground=True,
     most_pieces=compressed.room,
 )
 CRAZYSWARM2 = FlightFormat(
@@ -142,5 +146,7 @@ CRAZYSWARM2 = FlightFormat(
     precision=crazyswarm.FORMAT.precision,
     tolerance=crazyswarm.FORMAT.tolerance,
     several=True,
+    from_rest=True,
+    from_ground=True,
     most_pieces=crazyswarm.room,
 )

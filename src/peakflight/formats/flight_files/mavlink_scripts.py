@@ -81,6 +81,8 @@ _SHARED = {
     "precision": Precision(position=1e-6, relative=1e-7),
     "tolerance": 1e-2,
     "fixed": SET_POINTS,
+    "from_rest": True,
+    "from_ground": True,
 }
 _NUMBERS = "single precision, set-points at 50 Hz"
 PX4 = FlightFormat(
