@@ -1,5 +1,6 @@
 """Flight files through `peakflight.export`: what is written, read back and reported."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 import peakflight as pf
 from peakflight.exporting.fit import held, stretched
 from peakflight.exporting.merging import merged
+from peakflight.exporting.writing import _cost_notes
 from peakflight.formats import FLIGHT_FORMATS, find_format, read_course
 from peakflight.formats.flight_files.flight_format import Reading, through_samples
 from peakflight.formats.flight_files.rounded import control_points, motion, rounded
@@ -220,6 +222,44 @@ def test_a_show_keeps_paths_steps_and_delays(plan: pf.Plan, tmp_path: Path) -> N
         begins = [flight.trajectory.start_time for flight in report.flights]
         assert begins == pytest.approx([0.0, 1.5 * stretch], abs=2e-3)
         assert max(flight.rounding.position for flight in report.flights) < 0.01
+
+
+@pytest.mark.parametrize("name", ["skyc", "ros2", "crazyswarm2"])
+def test_a_show_says_how_near_drones_come(name: str, plan: pf.Plan, tmp_path: Path) -> None:
+    drones = [translated(plan, [x, 0.0, z]) for x, z in ((0.0, 0.0), (9.0, 9.0), (0.0, 0.4))]
+    report = pf.export(drones, to=name, path=tmp_path / "show", names=["a", "b", "c"])
+    (note,) = (note for note in report.notes if "come nearest" in note)
+    assert note.startswith("a and c come nearest, at ")
+    near, proven = (float(number) for number in re.findall(r"([\d.]+) m[,;]", note)[:2])
+    assert near == pytest.approx(0.4, abs=3e-3)  # rounding to mm moves either
+    assert proven <= near + 1e-3
+    times = np.linspace(0.0, report.flights[0].trajectory.end_time, 2001)
+    first, _, third = (flight.trajectory for flight in report.flights)
+    ends = [np.clip(times, one.start_time, one.end_time) for one in (first, third)]
+    apart = np.linalg.norm(first(ends[0]) - third(ends[1]), axis=1).min()
+    assert proven - 1e-6 <= apart <= near + 1e-3
+    (alone,) = pf.export(plan, to=name, path=tmp_path / "one").flights
+    assert alone.name == "drone_1"
+
+
+@pytest.mark.parametrize("cost", [0.4, -0.095])
+def test_a_note_says_longer_or_shorter(cost: float, plan: pf.Plan, tmp_path: Path) -> None:
+    (flight,) = pf.export(plan, to="crazyswarm", path=tmp_path / "f").flights
+    changed = replace(flight, refitted=True, duration=flight.plan_duration * (1.0 + cost / 100.0))
+    (note,) = _cost_notes([changed])
+    assert f": {abs(cost):.2g} % {'longer' if cost > 0 else 'shorter'}, and" in note
+
+
+def test_pieces_are_those_that_were_written(tmp_path: Path) -> None:
+    limits = pf.Limits(speed=0.1, jerk=1.0)
+    made = pf.plan([[0, 0, 1.0], [8.0, 0, 1.0]], limits=limits, pieces=1)
+    assert len(made.trajectory) == 1
+    for name, written in (("crazyswarm", 2), ("crazyflie-compressed", 3), ("json", 1)):
+        report = pf.export(made, to=name, path=tmp_path / "f")
+        (flight,) = report.flights
+        assert (flight.pieces, flight.refitted) == (written, False)
+        (reading,) = FLIGHT_FORMATS[name].decode((tmp_path / "f").read_bytes())
+        assert len(reading.trajectory) == written
 
 
 def test_stretched_shows_stay_in_step(plan: pf.Plan) -> None:
