@@ -6,6 +6,7 @@ import importlib.util
 import io
 import re
 import sys
+import time
 import types
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -414,7 +415,7 @@ class Autopilot:
         from pymavlink.dialects.v20 import ardupilotmega as dialect
 
         self.dialect, self.clock, self.refuses = dialect, clock, refuses
-        self.target_system = self.target_component = 1
+        self.target_system = self.target_component = 0  # as pymavlink's before it is told
         self.parser = dialect.MAVLink(None)
         self.mav = dialect.MAVLink(self, srcSystem=255)
         self.received: list[Any] = []
@@ -432,9 +433,6 @@ class Autopilot:
     def set_mode(self, mode: str) -> None:
         self.modes.append(mode)
         self.mode = {"GUIDED": 4, "LAND": 9}[mode]
-
-    def wait_heartbeat(self, timeout: float) -> object:
-        return object()
 
     def recv_match(self, type: list[str], blocking: bool = False, **_: Any) -> Any:
         if blocking:
@@ -454,12 +452,12 @@ class Autopilot:
             return None
         self.ground_station = not self.ground_station
         if self.ground_station:
-            return Message("HEARTBEAT", system=255, component=190, base_mode=0, custom_mode=0)
+            return Message("HEARTBEAT", 255, 190, autopilot=8, base_mode=0, custom_mode=0)
         self.next_beat = self.clock.now + 1.0
         landing = self.modes[-1:] == ["LAND"]
         self.down_beats += landing
         armed = 0 if self.down_beats > 2 else self.dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        return Message("HEARTBEAT", base_mode=armed, custom_mode=self.mode)
+        return Message("HEARTBEAT", autopilot=3, base_mode=armed, custom_mode=self.mode)
 
 
 class Message(SimpleNamespace):
@@ -485,6 +483,7 @@ def test_ardupilot_script_flies(plan: pf.Plan, tmp_path: Path, clock: Clock) -> 
     assert vehicle.modes == ["GUIDED", "LAND"]
     assert vehicle.down_beats == 3  # the ground station's are not taken for landed
     points = [m for m in messages if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    assert {(m.target_system, m.target_component) for m in messages} == {(1, 1)}
     assert {(m.coordinate_frame, m.type_mask) for m in points} == {(1, 0)}
     last = points[-1]
     np.testing.assert_allclose((last.x, last.y, last.z), (1.0, 1.2, -0.9), atol=1e-6)
@@ -496,7 +495,7 @@ def test_ardupilot_script_flies(plan: pf.Plan, tmp_path: Path, clock: Clock) -> 
     assert max(speeds) == pytest.approx(fastest, rel=0.02)
 
 
-@pytest.mark.parametrize("after", [0.5, 6.0, 9.0])
+@pytest.mark.parametrize("after", [1.5, 6.0, 9.0])
 def test_ardupilot_script_leaves_the_vehicle_to_the_pilot(
     after: float, plan: pf.Plan, tmp_path: Path, clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -578,3 +577,42 @@ def test_a_script_names_the_limits_that_it_is_held_to(
     named = {kind.name for kind in KINDS if re.search(rf"[:,] {kind.label} \d", said)}
     assert named == set(flight.held)
     assert ("jerk" in named) == (name in ("cflib", "crazyswarm2"))
+
+
+def test_ardupilot_script_knows_the_vehicle_on_a_real_link(
+    plan: pf.Plan, tmp_path: Path, clock: Clock
+) -> None:
+    """Through pymavlink's own connection, over the loopback."""
+    from pymavlink import mavutil
+
+    pf.export(plan, to="ardupilot", path=tmp_path / "fly.py")
+    module = load(tmp_path / "fly.py", clock)
+    module.time = time
+    link = mavutil.mavlink_connection("udpin:127.0.0.1:0")
+    port = link.port.getsockname()[1]
+    senders = {
+        who: mavutil.mavlink_connection(
+            f"udpout:127.0.0.1:{port}", source_system=who[0], source_component=who[1]
+        )
+        for who in ((255, 190), (7, 1))
+    }
+
+    def beat(who: tuple[int, int], autopilot: int, mode: int) -> None:
+        senders[who].mav.heartbeat_send(2, autopilot, 0, mode, 4)
+
+    try:
+        beat((255, 190), 8, 0)
+        beat((7, 1), 3, LOITER)
+        assert module.find_vehicle(link)
+        assert (link.target_system, link.target_component) == (7, 1)
+        beat((7, 1), 3, module.GUIDED)
+        beat((255, 190), 8, 0)
+        assert module.receive(link, "HEARTBEAT", 1.0).custom_mode == module.GUIDED
+        module.check_mode(link)
+        beat((7, 1), 3, LOITER)
+        time.sleep(0.05)
+        with pytest.raises(module.PilotHasControl):
+            module.check_mode(link)
+    finally:
+        for one in (link, *senders.values()):
+            one.close()
