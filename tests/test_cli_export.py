@@ -48,12 +48,38 @@ def refused(result: Result, *words: str) -> None:
 
 @pytest.mark.parametrize("name", FLIGHT_FORMATS)
 def test_every_format_is_written_beside_the_plan(name: str, run: Run, folder: Path) -> None:
-    result = run("export", "one/plan.json", "--to", name)
+    (folder / "one" / "plan.json").rename("one/lap.json")
+    result = run("export", "one/lap.json", "--to", name)
     assert (result.exit_code, result.stderr) == (0, "")
     path = folder / "one" / FLIGHT_FORMATS[name].filename
     assert f"wrote {Path('one') / path.name}: {name}, {path.stat().st_size} bytes" in result.stdout
     assert "proven again as it is read" in result.stdout
     assert "jumps at joints" in result.stdout
+
+
+def test_plans_are_not_written_over(run: Run) -> None:
+    before = Path("one/plan.json").read_bytes()
+    itself = ("is the plan itself; name another file with -o",)
+    refused(run("export", "one/plan.json", "--to", "json"), *itself)
+    for output in ("one/plan.json", "one/../one/plan.json", "link"):
+        Path("link").unlink(missing_ok=True)
+        Path("link").symlink_to("one/plan.json")
+        refused(run("export", "one/plan.json", "--to", "samples", "-o", output), *itself)
+    both = ("one/plan.json", "two/plan.json")
+    refused(run("export", *both, "--to", "skyc", "-o", "two/plan.json"), *itself)
+    assert Path("one/plan.json").read_bytes() == Path("two/plan.json").read_bytes() == before
+
+
+def test_another_plan_is_not_replaced_unless_it_is_named(run: Run) -> None:
+    slower = json.loads(Path("two/plan.json").read_text())
+    slower["message"] = "another"
+    Path("one/other.json").write_text(json.dumps(slower))
+    before = Path("one/plan.json").read_bytes()
+    refused(run("export", "one/other.json", "--to", "json"), "name the file with -o")
+    assert Path("one/plan.json").read_bytes() == before
+    assert run("export", "one/other.json", "--to", "json", "-o", "one/plan.json").exit_code == 0
+    assert run("export", "one/other.json", "--to", "json").exit_code == 0  # the same again
+    assert json.loads(Path("one/plan.json").read_text())["message"] == "another"
 
 
 def test_json_is_one_object(run: Run) -> None:
@@ -73,6 +99,8 @@ def test_json_is_one_object(run: Run) -> None:
 def test_a_show_of_two(run: Run) -> None:
     result = run("export", "one/plan.json", "two/plan.json", "--to", "skyc", "-o", "show.skyc")
     assert result.exit_code == 0
+    assert "distances between drones are no such limit" in " ".join(result.stdout.split())
+    assert "note: one and two come nearest, at " in result.stdout
     assert [line.split()[0] for line in result.stdout.splitlines() if "%" in line][:2] == [
         "one",
         "two",

@@ -1,5 +1,6 @@
 """Flight files through `peakflight.export`: what is written, read back and reported."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 import peakflight as pf
 from peakflight.exporting.fit import held, stretched
 from peakflight.exporting.merging import merged
+from peakflight.exporting.writing import _cost_notes
 from peakflight.formats import FLIGHT_FORMATS, find_format, read_course
 from peakflight.formats.flight_files.flight_format import Reading, through_samples
 from peakflight.formats.flight_files.rounded import control_points, motion, rounded
@@ -61,8 +63,14 @@ def stated(name: str, plan: pf.Plan) -> float:
 @pytest.mark.parametrize("path", PUBLIC, ids=lambda path: path.name)
 def test_every_format_is_within_its_precision_and_tolerance(path: Path, tmp_path: Path) -> None:
     """All public courses for the stock Crazyflie: the files say themselves how exact they are."""
-    flown = pf.plan(pf.tidy(read_course(path))[0].waypoints, vehicle="crazyflie-2.1")
+    waypoints = pf.tidy(read_course(path))[0].waypoints
+    flown = pf.plan(waypoints, vehicle="crazyflie-2.1")
+    underground = flown.trajectory.sample(2000)[..., 2].min() < -0.01
     for name, chosen in FLIGHT_FORMATS.items():
+        if chosen.from_ground and underground:
+            with pytest.raises(pf.InvalidProblem, match=r"the plan goes down to z = -"):
+                pf.export(flown, to=name, path=tmp_path / chosen.filename)
+            continue
         if name in ON_CRAZYFLIE and len(flown.pieces) > 31:
             with pytest.raises(pf.InvalidProblem, match=r"each of its 100 legs needs one"):
                 pf.export(flown, to=name, path=tmp_path / chosen.filename)
@@ -163,9 +171,11 @@ def test_refit_meets_the_effort_of_a_smooth_plan(tmp_path: Path) -> None:
 
 def test_no_refit_refuses_or_reports(long_plan: pf.Plan, tmp_path: Path) -> None:
     with pytest.raises(
-        pf.InvalidProblem, match=r"\d+ pieces; there is room for 31; plan with fewer"
+        pf.InvalidProblem, match=r"\d pieces; there is room for 31; plan with fewer"
     ):
-        pf.export(long_plan, to="cflib", path=tmp_path / "c.csv", refit=False)
+        pf.export(
+            translated(long_plan, [0.0, 0.0, 1.0]), to="cflib", path=tmp_path / "c.csv", refit=False
+        )
     report = pf.export(long_plan, to="skyc", path=tmp_path / "c.skyc", refit=False)
     assert not report.feasible
     assert "1.01 is allowed for rounding" in report.problems[0]
@@ -195,11 +205,16 @@ def test_a_reading_beyond_its_limits_is_found(plan: pf.Plan) -> None:
 # ---- several drones ---------------------------------------------------------------------------
 
 
+def translated(plan: pf.Plan, offset: list[float]) -> pf.Plan:
+    problem = replace(plan.problem, waypoints=plan.problem.waypoints + np.array(offset))
+    return replace(plan, problem=problem, trajectory=plan.trajectory.translate(offset))
+
+
 def test_a_show_keeps_paths_steps_and_delays(plan: pf.Plan, tmp_path: Path) -> None:
-    late = replace(plan, trajectory=plan.trajectory.translate([2.0, 0.0, 0.0]).shift(1.5))
-    late = replace(late, yaw_motion=plan.yaw_motion.shift(1.5))
-    moved = late.problem.waypoints + np.array([2.0, 0.0, 0.0])
-    late = replace(late, problem=replace(late.problem, waypoints=moved))
+    late = translated(plan, [2.0, 0.0, 0.0])
+    late = replace(
+        late, trajectory=late.trajectory.shift(1.5), yaw_motion=plan.yaw_motion.shift(1.5)
+    )
     for name in ("skyc", "ros2"):
         report = pf.export([plan, late], to=name, path=tmp_path / "show", names=["a", "b"])
         first, second = report.flights
@@ -213,6 +228,44 @@ def test_a_show_keeps_paths_steps_and_delays(plan: pf.Plan, tmp_path: Path) -> N
         assert max(flight.rounding.position for flight in report.flights) < 0.01
 
 
+@pytest.mark.parametrize("name", ["skyc", "ros2", "crazyswarm2"])
+def test_a_show_says_how_near_drones_come(name: str, plan: pf.Plan, tmp_path: Path) -> None:
+    drones = [translated(plan, [x, 0.0, z]) for x, z in ((0.0, 0.0), (9.0, 9.0), (0.0, 0.4))]
+    report = pf.export(drones, to=name, path=tmp_path / "show", names=["a", "b", "c"])
+    (note,) = (note for note in report.notes if "come nearest" in note)
+    assert note.startswith("a and c come nearest, at ")
+    near, proven = (float(number) for number in re.findall(r"([\d.]+) m[,;]", note)[:2])
+    assert near == pytest.approx(0.4, abs=3e-3)  # rounding to mm moves either
+    assert proven <= near + 1e-3
+    times = np.linspace(0.0, report.flights[0].trajectory.end_time, 2001)
+    first, _, third = (flight.trajectory for flight in report.flights)
+    ends = [np.clip(times, one.start_time, one.end_time) for one in (first, third)]
+    apart = np.linalg.norm(first(ends[0]) - third(ends[1]), axis=1).min()
+    assert proven - 1e-6 <= apart <= near + 1e-3
+    (alone,) = pf.export(plan, to=name, path=tmp_path / "one").flights
+    assert alone.name == "drone_1"
+
+
+@pytest.mark.parametrize("cost", [0.4, -0.095])
+def test_a_note_says_longer_or_shorter(cost: float, plan: pf.Plan, tmp_path: Path) -> None:
+    (flight,) = pf.export(plan, to="crazyswarm", path=tmp_path / "f").flights
+    changed = replace(flight, refitted=True, duration=flight.plan_duration * (1.0 + cost / 100.0))
+    (note,) = _cost_notes([changed])
+    assert f": {abs(cost):.2g} % {'longer' if cost > 0 else 'shorter'}, and" in note
+
+
+def test_pieces_are_those_that_were_written(tmp_path: Path) -> None:
+    limits = pf.Limits(speed=0.1, jerk=1.0)
+    made = pf.plan([[0, 0, 1.0], [8.0, 0, 1.0]], limits=limits, pieces=1)
+    assert len(made.trajectory) == 1
+    for name, written in (("crazyswarm", 2), ("crazyflie-compressed", 3), ("json", 1)):
+        report = pf.export(made, to=name, path=tmp_path / "f")
+        (flight,) = report.flights
+        assert (flight.pieces, flight.refitted) == (written, False)
+        (reading,) = FLIGHT_FORMATS[name].decode((tmp_path / "f").read_bytes())
+        assert len(reading.trajectory) == written
+
+
 def test_stretched_shows_stay_in_step(plan: pf.Plan) -> None:
     late = replace(plan, trajectory=plan.trajectory.shift(2.0))
     first, second = stretched([plan, late], 1.5)
@@ -220,8 +273,11 @@ def test_stretched_shows_stay_in_step(plan: pf.Plan) -> None:
 
 
 def test_shows_are_not_planned_again(long_plan: pf.Plan, tmp_path: Path) -> None:
-    with pytest.raises(pf.InvalidProblem, match=r"plan 1: the flight has \d+ pieces"):
-        pf.export([long_plan, long_plan], to="crazyswarm2", path=tmp_path / "fly.py")
+    above = translated(long_plan, [0.0, 0.0, 1.0])
+    with pytest.raises(
+        pf.InvalidProblem, match=rf"plan 1: the flight has {len(above.trajectory)} pieces"
+    ):
+        pf.export([above, above], to="crazyswarm2", path=tmp_path / "fly.py")
 
 
 # ---- bad input --------------------------------------------------------------------------------
@@ -253,6 +309,36 @@ def test_bad_input_is_one_clear_error(plan: pf.Plan, tmp_path: Path) -> None:
 def test_a_plan_that_is_not_proven_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
     fast = replace(plan, trajectory=plan.trajectory.stretch(0.5))
     refused(r"the plan is not proven to keep its limits: speed", fast, tmp_path / "f", to="px4")
+
+
+HOVERING = ("cflib", "cflib-compressed", "crazyswarm2", "px4", "ardupilot", "skyc")
+
+
+def test_a_flight_that_begins_or_ends_in_motion_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
+    first, second = plan.trajectory.split(0.5 * plan.duration)
+    speed = np.linalg.norm(second(second.start_time, 1))
+    for part, end in ((first, "ends"), (second.shift(-second.start_time), "begins")):
+        waypoints = np.array([part(part.start_time), part(part.end_time)])
+        moving = replace(
+            plan,
+            problem=replace(plan.problem, waypoints=waypoints),
+            trajectory=part,
+            yaw_motion=None,
+        )
+        for name in HOVERING:
+            with pytest.raises(pf.InvalidProblem, match=rf"the plan {end} at {speed:.3g} m/s") as e:
+                pf.export(moving, to=name, path=tmp_path / "f")
+            assert "hovers before and after; the plan must begin and end at rest" in str(e.value)
+
+
+def test_a_script_that_would_go_underground_is_refused(plan: pf.Plan, tmp_path: Path) -> None:
+    lowest = float(plan.trajectory.sample(2000)[..., 2].min())
+    on_ground, under = (translated(plan, [0.0, 0.0, h - lowest]) for h in (0.0, -0.25))
+    for name in HOVERING[:-1]:
+        words = r"the plan goes down to z = -0\.25 m at .* z is above where the vehicle starts"
+        refused(words, under, tmp_path / "f", to=name)
+    for made, name in ((under, "skyc"), (on_ground, "px4")):
+        assert pf.export(made, to=name, path=tmp_path / name).feasible
 
 
 def test_what_is_too_far_out_is_refused(tmp_path: Path) -> None:

@@ -1,11 +1,15 @@
 """Generated scripts, run dry: the real libraries where there are any, over recorded links."""
 
+import ast
 import asyncio
 import importlib.util
 import io
+import re
 import sys
+import time
 import types
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -14,6 +18,8 @@ import numpy as np
 import pytest
 
 import peakflight as pf
+from peakflight.formats import FLIGHT_FORMATS
+from peakflight.limits import KINDS
 
 WAYPOINTS = [[0.0, 0.0, 1.0], [0.8, 0.4, 1.2], [1.2, 1.0, 0.9]]
 
@@ -277,8 +283,15 @@ def test_crazyswarm2_script_aborts(
 # ---- PX4 --------------------------------------------------------------------------------------
 
 
-def fly_px4(module: ModuleType, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def fly_px4(
+    module: ModuleType,
+    clock: Clock,
+    monkeypatch: pytest.MonkeyPatch,
+    taken: float = float("inf"),
+) -> list[Any]:
     calls: list[Any] = []
+    modes = module.FlightMode
+    offboard_from = [float("inf")]
 
     class Vehicle:
         def __init__(self, _: Any) -> None:
@@ -287,9 +300,15 @@ def fly_px4(module: ModuleType, clock: Clock, monkeypatch: pytest.MonkeyPatch) -
         def __getattr__(self, command: str) -> Callable[..., Any]:
             async def called(*values: Any) -> bool:
                 calls.append((clock.now, command, *values))
+                if command == "start":
+                    offboard_from[0] = clock.now + 0.2  # telemetry tells it later
                 return False
 
             return called
+
+        async def flight_mode(self) -> Any:
+            offboard = offboard_from[0] <= clock.now < taken
+            return modes.OFFBOARD if offboard else modes.POSCTL
 
         async def subscribe_position_velocity_ned(self) -> Any:
             yield SimpleNamespace(position=SimpleNamespace(north_m=0.1, east_m=0.2, down_m=-0.05))
@@ -351,6 +370,24 @@ def test_px4_script_flies(
     assert min(near) < 0.05
 
 
+@pytest.mark.parametrize("after", [1.0, 6.0, 8.5])
+def test_px4_script_leaves_the_vehicle_to_the_pilot(
+    after: float,
+    plan: pf.Plan,
+    tmp_path: Path,
+    clock: Clock,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pf.export(plan, to="px4", path=tmp_path / "fly.py")
+    module = load(tmp_path / "fly.py", clock)
+    taken = clock.now + after
+    calls = fly_px4(module, clock, monkeypatch, taken)
+    assert capsys.readouterr().out.splitlines()[-1] == "the pilot has control"
+    assert not {"land", "kill"} & {call[1] for call in calls}
+    assert calls[-1][0] < taken  # nothing at all is sent from then on
+
+
 def test_px4_script_aborts(
     plan: pf.Plan, tmp_path: Path, clock: Clock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -365,19 +402,27 @@ def test_px4_script_aborts(
 # ---- ArduPilot --------------------------------------------------------------------------------
 
 
+LOITER = 5
+"""The number of a mode of the pilot's."""
+
+
 class Autopilot:
     """A vehicle behind pymavlink's own packer: what is sent is packed, and unpacked again."""
 
-    def __init__(self, clock: Clock, refuses: int | None = None) -> None:
+    def __init__(
+        self, clock: Clock, refuses: int | None = None, taken: float | None = None
+    ) -> None:
         from pymavlink.dialects.v20 import ardupilotmega as dialect
 
         self.dialect, self.clock, self.refuses = dialect, clock, refuses
-        self.target_system = self.target_component = 1
+        self.target_system = self.target_component = 0  # as pymavlink's before it is told
         self.parser = dialect.MAVLink(None)
         self.mav = dialect.MAVLink(self, srcSystem=255)
         self.received: list[Any] = []
         self.modes: list[str] = []
         self.height = 0.0
+        self.mode, self.taken = LOITER, taken
+        self.next_beat, self.ground_station, self.down_beats = 0.0, False, 0
 
     def write(self, data: bytes) -> None:
         for message in self.parser.parse_buffer(data) or []:
@@ -387,18 +432,41 @@ class Autopilot:
 
     def set_mode(self, mode: str) -> None:
         self.modes.append(mode)
+        self.mode = {"GUIDED": 4, "LAND": 9}[mode]
 
-    def wait_heartbeat(self, timeout: float) -> object:
-        return object()
+    def recv_match(self, type: list[str], blocking: bool = False, **_: Any) -> Any:
+        if blocking:
+            self.clock.sleep(0.01)
+        if self.taken is not None and self.clock.now >= self.taken:
+            self.mode = LOITER
+        if not blocking or type[0] == "HEARTBEAT":
+            return self._beat()
+        if type[0] == "LOCAL_POSITION_NED":
+            return Message(type[0], x=0.0, y=0.0, z=-self.height)
+        command = self.received[-1][1].command
+        return Message(type[0], command=command, result=int(command == self.refuses))
 
-    def recv_match(self, type: str, **_: Any) -> Any:
-        self.clock.sleep(0.01)
-        if type == "LOCAL_POSITION_NED":
-            return SimpleNamespace(x=0.0, y=0.0, z=-self.height)
-        if type == "COMMAND_ACK":
-            command = self.received[-1][1].command
-            return SimpleNamespace(command=command, result=int(command == self.refuses))
-        return SimpleNamespace(base_mode=0)
+    def _beat(self) -> Any:
+        """A heartbeat each second of the vehicle, and one of a ground station."""
+        if self.clock.now < self.next_beat:
+            return None
+        self.ground_station = not self.ground_station
+        if self.ground_station:
+            return Message("HEARTBEAT", 255, 190, autopilot=8, base_mode=0, custom_mode=0)
+        self.next_beat = self.clock.now + 1.0
+        landing = self.modes[-1:] == ["LAND"]
+        self.down_beats += landing
+        armed = 0 if self.down_beats > 2 else self.dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        return Message("HEARTBEAT", autopilot=3, base_mode=armed, custom_mode=self.mode)
+
+
+class Message(SimpleNamespace):
+    """What pymavlink gives of a message, of the vehicle unless said otherwise."""
+
+    def __init__(self, kind: str, system: int = 1, component: int = 1, **values: Any) -> None:
+        super().__init__(**values)
+        self.get_type = lambda: kind
+        self.get_srcSystem, self.get_srcComponent = lambda: system, lambda: component
 
 
 def fly_ardupilot(module: ModuleType, vehicle: Autopilot) -> list[Any]:
@@ -413,7 +481,9 @@ def test_ardupilot_script_flies(plan: pf.Plan, tmp_path: Path, clock: Clock) -> 
     vehicle = Autopilot(clock)
     messages = fly_ardupilot(module, vehicle)
     assert vehicle.modes == ["GUIDED", "LAND"]
+    assert vehicle.down_beats == 3  # the ground station's are not taken for landed
     points = [m for m in messages if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    assert {(m.target_system, m.target_component) for m in messages} == {(1, 1)}
     assert {(m.coordinate_frame, m.type_mask) for m in points} == {(1, 0)}
     last = points[-1]
     np.testing.assert_allclose((last.x, last.y, last.z), (1.0, 1.2, -0.9), atol=1e-6)
@@ -425,6 +495,41 @@ def test_ardupilot_script_flies(plan: pf.Plan, tmp_path: Path, clock: Clock) -> 
     assert max(speeds) == pytest.approx(fastest, rel=0.02)
 
 
+@pytest.mark.parametrize("after", [1.5, 6.0, 9.0])
+def test_ardupilot_script_leaves_the_vehicle_to_the_pilot(
+    after: float, plan: pf.Plan, tmp_path: Path, clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Taken over before the hover, on the way to the start, and on the plan or after."""
+    pf.export(plan, to="ardupilot", path=tmp_path / "fly.py")
+    module = load(tmp_path / "fly.py", clock)
+    vehicle = Autopilot(clock, taken=clock.now + after)
+    fly_ardupilot(module, vehicle)
+    assert vehicle.modes == ["GUIDED"]  # neither landed nor taken back
+    assert capsys.readouterr().out.splitlines()[-1] == "the pilot has control"
+    assert vehicle.taken is not None
+    assert max(at for at, _ in vehicle.received) <= vehicle.taken + 1.0  # the next heartbeat
+    sent = {m.command for _, m in vehicle.received if m.get_type() == "COMMAND_LONG"}
+    assert sent == {400, 22, 511}  # armed, take-off, how often to tell the position
+
+
+def test_ardupilot_script_leaves_the_landing_to_the_pilot(
+    plan: pf.Plan, tmp_path: Path, clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pf.export(plan, to="ardupilot", path=tmp_path / "fly.py")
+    module = load(tmp_path / "fly.py", clock)
+    vehicle = Autopilot(clock)
+    land = module.land
+
+    def taken(link: Any, key: Any) -> None:
+        vehicle.taken = clock.now + 1.5
+        land(link, key)
+
+    module.land = taken
+    fly_ardupilot(module, vehicle)
+    assert vehicle.modes == ["GUIDED", "LAND"]
+    assert capsys.readouterr().out.splitlines()[-1] == "the pilot has control"
+
+
 def test_ardupilot_script_lands_if_it_is_refused(
     plan: pf.Plan, tmp_path: Path, clock: Clock, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -434,3 +539,80 @@ def test_ardupilot_script_lands_if_it_is_refused(
     fly_ardupilot(module, vehicle)
     assert vehicle.modes == ["GUIDED", "LAND"]
     assert "the vehicle refuses command 22" in capsys.readouterr().out
+
+
+# ---- what the header of a script says -----------------------------------------------------------
+
+SCRIPTS = ("cflib", "cflib-compressed", "crazyswarm2", "px4", "ardupilot")
+
+
+def docstring(path: Path) -> str:
+    return ast.get_docstring(ast.parse(path.read_text())) or ""
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("called", ['q""";print("INJECTED");"""', "ends in \\", "$name ${x}"])
+def test_a_vehicles_name_stays_text(name: str, called: str, plan: pf.Plan, tmp_path: Path) -> None:
+    assert plan.vehicle is not None
+    problem = replace(plan.problem, vehicle=replace(plan.vehicle, name=called))
+    path = tmp_path / "fly.py"
+    pf.export(replace(plan, problem=problem), to=name, path=path)
+    values = [
+        node.value for node in ast.walk(ast.parse(path.read_text())) if type(node) is ast.Expr
+    ]
+    printed = [ast.unparse(call) for call in values if isinstance(call, ast.Call)]
+    assert not any("INJECTED" in call for call in printed)
+    assert f"for {re.sub('[^a-zA-Z .]', '_', called)}; planned" in docstring(path)
+    (reading,) = FLIGHT_FORMATS[name].decode(path.read_bytes())
+    assert reading.trajectory.duration == pytest.approx(plan.duration, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_script_names_the_limits_that_it_is_held_to(
+    name: str, plan: pf.Plan, tmp_path: Path
+) -> None:
+    (flight,) = pf.export(plan, to=name, path=tmp_path / "fly.py").flights
+    said = docstring(tmp_path / "fly.py")
+    assert "certified" not in said
+    named = {kind.name for kind in KINDS if re.search(rf"[:,] {kind.label} \d", said)}
+    assert named == set(flight.held)
+    assert ("jerk" in named) == (name in ("cflib", "crazyswarm2"))
+
+
+def test_ardupilot_script_knows_the_vehicle_on_a_real_link(
+    plan: pf.Plan, tmp_path: Path, clock: Clock
+) -> None:
+    """Through pymavlink's own connection, over the loopback."""
+    from pymavlink import mavutil
+
+    pf.export(plan, to="ardupilot", path=tmp_path / "fly.py")
+    module = load(tmp_path / "fly.py", clock)
+    module.time = time
+    link = mavutil.mavlink_connection("udpin:127.0.0.1:0")
+    port = link.port.getsockname()[1]
+    senders = {
+        who: mavutil.mavlink_connection(
+            f"udpout:127.0.0.1:{port}", source_system=who[0], source_component=who[1]
+        )
+        for who in ((255, 190), (7, 1))
+    }
+
+    def beat(who: tuple[int, int], autopilot: int, mode: int) -> None:
+        senders[who].mav.heartbeat_send(2, autopilot, 0, mode, 4)
+
+    try:
+        beat((255, 190), 8, 0)
+        beat((7, 1), 3, LOITER)
+        assert module.find_vehicle(link)
+        assert (link.target_system, link.target_component) == (7, 1)
+        beat((7, 1), 3, module.GUIDED)
+        beat((255, 190), 8, 0)
+        assert module.receive(link, "HEARTBEAT", 1.0).custom_mode == module.GUIDED
+        module.check_mode(link)
+        beat((7, 1), 3, LOITER)
+        time.sleep(0.05)
+        with pytest.raises(module.PilotHasControl):
+            module.check_mode(link)
+    finally:
+        for one in (link, *senders.values()):
+            one.close()

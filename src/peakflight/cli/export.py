@@ -10,6 +10,7 @@ import click
 from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, print_json, ratio_cells, seconds
 from peakflight.cli.progress import Progress
+from peakflight.errors import InvalidFile
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.formats.flight_files import OTHER_NAMES, find_format
 from peakflight.result import Plan
@@ -85,13 +86,17 @@ def export(
     with Progress() as progress:
         progress.stage(f"reading {len(plans)} plan{'' if len(plans) == 1 else 's'}")
         read = [Plan.load(path) for path in plans]
+        path = plans[0].parent / chosen.filename if output is None else output
+        _keep_inputs(path, plans)
+        if output is None and name == "json":
+            _keep_other_plan(path, read[0])
         progress.stage(f"writing {chosen.filename}")
         from peakflight.exporting import export as write
 
         report = write(
             read,
             to=name,
-            path=output or plans[0].parent / chosen.filename,
+            path=path,
             refit=not no_refit,
             names=_names(plans),
         )
@@ -102,6 +107,19 @@ def export(
     if not report.feasible:
         click.echo(f"peakflight: {report.path}: {report.problems[0]}", err=True)
     return 0 if report.feasible else 1
+
+
+def _keep_inputs(path: Path, plans: Sequence[Path]) -> None:
+    """Refuse to write over what is read."""
+    for plan in plans:
+        if path.exists() and path.samefile(plan):
+            raise InvalidFile(f"{path}: is the plan itself; name another file with -o")
+
+
+def _keep_other_plan(path: Path, plan: Plan) -> None:
+    """Refuse to put a plan in the place of another one that nobody named."""
+    if path.is_file() and path.read_bytes() != FLIGHT_FORMATS["json"].encode([plan], [""]).data:
+        raise InvalidFile(f"{path}: is there already, another plan; name the file with -o")
 
 
 def _names(plans: Sequence[Path]) -> list[str]:
@@ -121,8 +139,9 @@ def _print(report: Any) -> None:
     several = len(report.flights) > 1
     out.path(f"wrote {report.path}: {report.format}, {report.size} bytes")
     if report.feasible:
+        but = "; distances between drones are no such limit" if several else ""
         out.line(
-            f"proven again as it is read, to {report.tolerance:g} of each limit that is held",
+            f"proven again as it is read, to {report.tolerance:g} of each limit that is held{but}",
             "good",
         )
     else:
@@ -150,7 +169,7 @@ def _print_one(out: Printout, flight: Any) -> None:
         pieces += f" in place of the plan's {flight.plan_pieces}"
     out.pairs(
         [
-            ("total time", f"{seconds(flight.duration)} s, {flight.cost:.3f} % above the plan's"),
+            ("total time", f"{seconds(flight.duration)} s, {_cost(flight.cost)} the plan's"),
             ("pieces", pieces),
             ("yaw", f"at most {math.degrees(flight.yaw_difference):.2g}° off the plan's"),
         ]
@@ -168,6 +187,10 @@ def _print_one(out: Printout, flight: Any) -> None:
         ("limit", ">ratio planned", ">in the file", ">margin", "", "held"),
         _limit_rows(flight),
     )
+
+
+def _cost(percent: float) -> str:
+    return f"{abs(percent):.3f} % {'below' if percent < 0.0 else 'above'}"
 
 
 def _flight_rows(flights: Sequence[Any]) -> Iterator[Sequence[str]]:

@@ -37,8 +37,10 @@ class ExportedFlight:
     plan_duration: float
     """s, of the plan that was given."""
     pieces: int
-    """Polynomials that were written."""
+    """Polynomials that were written; of set-points, those of the flight that they are of."""
     plan_pieces: int
+    refitted: bool
+    """Whether the flight was planned again with other pieces than the plan has."""
     difference: Differences
     """To the plan that was given, at the same part of the flight."""
     rounding: Differences
@@ -63,11 +65,6 @@ class ExportedFlight:
         """By how much longer the file flies than the plan, percent."""
         return 100.0 * (self.duration / self.plan_duration - 1.0)
 
-    @property
-    def refitted(self) -> bool:
-        """Whether other pieces were written than the plan has."""
-        return self.pieces != self.plan_pieces
-
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and names; without the trajectory."""
         values = {
@@ -75,7 +72,7 @@ class ExportedFlight:
             for key, value in vars(self).items()
             if key != "trajectory"
         }
-        return {**values, "cost": self.cost, "refitted": self.refitted}
+        return {**values, "cost": self.cost}
 
 
 @dataclass(frozen=True, kw_only=True)

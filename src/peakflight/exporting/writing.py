@@ -13,8 +13,10 @@ from peakflight.exporting.report import (
     jumps,
     yaw_difference,
 )
+from peakflight.exporting.whole_flight import check_whole_flight
 from peakflight.files import PathLike, write_atomically
 from peakflight.formats.flight_files import FlightFormat, Reading, find_format
+from peakflight.formats.flight_files.flight_format import POLYNOMIAL
 from peakflight.result import Plan
 
 
@@ -53,7 +55,8 @@ def export(
     ------
     InvalidProblem
         If the format is unknown or cannot hold the flight, a plan is not proven to keep its
-        limits, or a vehicle is missing; the message says which.
+        limits, begins or ends in motion or goes underground where the file flies from the ground
+        and back, or a vehicle is missing; the message says which.
     InvalidFile
         If the file cannot be written.
     MissingExtra
@@ -68,7 +71,7 @@ def export(
         raise InvalidFile(f"{path}: is a folder; name a file in it")
     written = fit(plans, names, chosen, refit=refit)
     flights = tuple(
-        _flight(*item)
+        _flight(*item, chosen)
         for item in zip(names, plans, written.plans, written.readings, written.held, strict=True)
     )
     write_atomically(path, written.encoded.data)
@@ -78,7 +81,7 @@ def export(
         size=len(written.encoded.data),
         tolerance=chosen.tolerance,
         flights=flights,
-        notes=(*_cost_notes(flights), *written.encoded.notes),
+        notes=(*_distance_notes(flights), *_cost_notes(flights), *written.encoded.notes),
     )
 
 
@@ -106,19 +109,23 @@ def _check(name: str, chosen: FlightFormat, plans: Sequence[Plan]) -> None:
                 f"format {name} needs a vehicle, and {which} has none; plan with vehicle=... "
                 "(--vehicle)"
             )
+        check_whole_flight(name, chosen, which, plan)
         proof = certify_plan(plan)
         if not proof.feasible:
             raise InvalidProblem(f"{which} is not proven to keep its limits: {proof.problems[0]}")
 
 
-def _flight(name: str, plan: Plan, fitted: Plan, reading: Reading, kept: Held) -> ExportedFlight:
+def _flight(
+    name: str, plan: Plan, fitted: Plan, reading: Reading, kept: Held, chosen: FlightFormat
+) -> ExportedFlight:
     flown = reading.trajectory
     return ExportedFlight(
         name=name,
         duration=flown.duration,
         plan_duration=plan.duration,
-        pieces=len(fitted.trajectory),
+        pieces=len(flown if chosen.fixed == POLYNOMIAL else fitted.trajectory),
         plan_pieces=len(plan.trajectory),
+        refitted=len(fitted.trajectory) != len(plan.trajectory),
         difference=differences(plan.trajectory, flown),
         rounding=differences(fitted.trajectory, flown),
         jumps=jumps(flown),
@@ -131,6 +138,21 @@ def _flight(name: str, plan: Plan, fitted: Plan, reading: Reading, kept: Held) -
     )
 
 
+def _distance_notes(flights: Sequence[ExportedFlight]) -> list[str]:
+    """How near drones come to each other in the file: no limit that it is held to."""
+    if len(flights) < 2:
+        return []
+    from peakflight.separation import closest_approach
+
+    nearest = closest_approach([flight.trajectory for flight in flights])
+    first, second = (flights[index].name for index in nearest.pair)
+    return [
+        f"{first} and {second} come nearest, at {nearest.time:.3f} s: {nearest.distance:.3f} m, "
+        f"no two are ever nearer than {nearest.bound:.6f} m, which is proven; whether that is far "
+        "enough is not"
+    ]
+
+
 def _cost_notes(flights: Sequence[ExportedFlight]) -> list[str]:
     """What a refit has cost, in words."""
     notes = []
@@ -139,7 +161,8 @@ def _cost_notes(flights: Sequence[ExportedFlight]) -> list[str]:
         if flight.refitted:
             notes.append(
                 f"{which}planned again with {flight.pieces} pieces in place of "
-                f"{flight.plan_pieces}: {flight.cost:.2g} % longer, and up to "
+                f"{flight.plan_pieces}: {abs(flight.cost):.2g} % "
+                f"{'longer' if flight.cost > 0.0 else 'shorter'}, and up to "
                 f"{flight.difference.position:.2g} m from the plan between waypoints"
             )
         elif flight.cost > SLOWER:

@@ -173,7 +173,7 @@ FORMAT = FlightFormat(
     summary="compressed polynomials as a Crazyflie's memory holds them",
     consumer="Crazyflie firmware, by memory write at the trajectory's offset",
     numbers="16 bits: mm, 0.1 deg, ms",
-    rules="32.767 m; degree 7; 69 pieces, 90 without turning; 65 s a piece",
+    rules="32.767 m; degree 7; 69 pieces, 90 without turning; pieces are cut at 60 s",
     encode=single(encode),
     decode=decode,
     precision=Precision(position=MILLI, time=MILLI),

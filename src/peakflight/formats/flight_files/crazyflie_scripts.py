@@ -26,7 +26,7 @@ def encode_cflib(plan: Plan, name: str = "") -> Encoded:
     return Encoded(
         script(
             "cflib.py.in",
-            described=described(plan),
+            described=described(plan, CFLIB.held),
             pieces=rows_text(rows),
             height=f"{_height(plan):.9g}",
         ),
@@ -47,7 +47,7 @@ def encode_compressed(plan: Plan, name: str = "") -> Encoded:
     return Encoded(
         script(
             "cflib_compressed.py.in",
-            described=described(plan),
+            described=described(plan, CFLIB_COMPRESSED.held),
             memory="\n".join(f'    "{data[i : i + 32].hex()}"' for i in range(0, len(data), 32)),
             count=len(curves.milliseconds),
             start=tuple((curves.points[0, 0, :3] * MILLI).round(3).tolist()),
@@ -87,7 +87,7 @@ def encode_crazyswarm2(plans: Sequence[Plan], names: Sequence[str]) -> Encoded:
     return Encoded(
         script(
             "crazyswarm2.py.in",
-            described="; ".join(described(plan) for plan in plans),
+            described="; ".join(described(plan, CRAZYSWARM2.held) for plan in plans),
             flights="\n".join(flights),
             height=f"{max(_height(plan) for plan in plans):.9g}",
         ),
@@ -116,6 +116,8 @@ CFLIB = FlightFormat(
     decode=decode_cflib,
     precision=crazyswarm.FORMAT.precision,
     tolerance=crazyswarm.FORMAT.tolerance,
+    from_rest=True,
+    from_ground=True,
     most_pieces=crazyswarm.room,
 )
 CFLIB_COMPRESSED = FlightFormat(
@@ -129,6 +131,8 @@ CFLIB_COMPRESSED = FlightFormat(
     precision=compressed.FORMAT.precision,
     tolerance=compressed.FORMAT.tolerance,
     coarse=True,
+    from_rest=True,
+    from_ground=True,
     most_pieces=compressed.room,
 )
 CRAZYSWARM2 = FlightFormat(
@@ -142,5 +146,7 @@ CRAZYSWARM2 = FlightFormat(
     precision=crazyswarm.FORMAT.precision,
     tolerance=crazyswarm.FORMAT.tolerance,
     several=True,
+    from_rest=True,
+    from_ground=True,
     most_pieces=crazyswarm.room,
 )

@@ -70,6 +70,10 @@ class FlightFormat:
     several: bool = False
     """Whether one file holds several drones."""
     needs_vehicle: bool = False
+    from_rest: bool = False
+    """Whether the vehicle hovers before and after, so that plans begin and end at rest."""
+    from_ground: bool = False
+    """Whether z is above where the vehicle starts, so that plans do not go below 0."""
     most_pieces: Callable[[Plan], int] | None = None
     """How many pieces of a plan there is room for; None for any number."""
 

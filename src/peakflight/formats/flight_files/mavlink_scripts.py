@@ -69,7 +69,7 @@ def _encoded(template: str, plan: Plan) -> Encoded:
     rows = set_points(plan)
     text = script(
         template,
-        described=described(plan),
+        described=described(plan, SET_POINTS),
         set_points=rows_text(rows),
         height=f"{max(HEIGHT, float(plan.trajectory.coefficients[0, 0, 2])):.9g}",
     )
@@ -81,6 +81,8 @@ _SHARED = {
     "precision": Precision(position=1e-6, relative=1e-7),
     "tolerance": 1e-2,
     "fixed": SET_POINTS,
+    "from_rest": True,
+    "from_ground": True,
 }
 _NUMBERS = "single precision, set-points at 50 Hz"
 PX4 = FlightFormat(

@@ -5,6 +5,7 @@ imported by them alone, never here.
 """
 
 import ast
+import re
 from importlib.resources import files
 from string import Template
 from typing import Any
@@ -19,6 +20,8 @@ from peakflight.version import __version__
 FOLDER = "templates"
 HEIGHT = 0.5
 """m: take-off goes at least as high before the vehicle flies to the start."""
+HARMFUL = re.compile(r"[^\w .+-]")
+"""Characters of a name that could end or change a docstring, or its line."""
 
 
 def script(template: str, **values: Any) -> bytes:
@@ -27,14 +30,19 @@ def script(template: str, **values: Any) -> bytes:
     return Template(text).substitute(version=__version__, **values).encode()
 
 
-def described(plan: Plan) -> str:
-    """A flight in a line: how long, how fast, under which limits."""
+def described(plan: Plan, held: int) -> str:
+    """A flight in a line: how long, for which vehicle, within which limits.
+
+    Limits on derivatives above `held` are left out: the script is not held to them. The line goes
+    into a docstring, so that of the vehicle's name only harmless characters stay.
+    """
     limits = ", ".join(
         f"{kind.label} {getattr(plan.problem.limits, kind.name):g} {plain_unit(kind.unit)}"
         for kind in plan.problem.limits.active
+        if kind.order <= held
     )
-    vehicle = "" if plan.vehicle is None else f" for {plan.vehicle.name}"
-    return f"{plan.duration:.2f} s{vehicle}; certified: {limits}"
+    vehicle = "" if plan.vehicle is None else f" for {HARMFUL.sub('_', plan.vehicle.name)}"
+    return f"{plan.duration:.2f} s{vehicle}" + (f"; planned within: {limits}" if limits else "")
 
 
 def rows_text(rows: np.ndarray) -> str:

@@ -198,4 +198,5 @@ FORMAT = FlightFormat(
     tolerance=1e-2,
     coarse=True,
     several=True,
+    from_rest=True,
 )
