@@ -611,6 +611,26 @@ class TestCommand:
         assert other.exit_code == 2
         assert "not in this batch" in other.stderr
 
+    def test_files_that_no_batch_has_made_are_left_as_they_are(self, folder: Path) -> None:
+        for name in ("summary.csv", "lap-2.plan.json"):
+            for more in ((), ("--resume",)):
+                kept = folder / "out" / name
+                kept.parent.mkdir(exist_ok=True)
+                kept.write_text("mine")
+                result = self.invoke("courses", "-o", "out", *more)
+                assert result.exit_code == 2
+                assert f"{name}: is there already" in result.stderr
+                assert kept.read_text() == "mine"
+                assert [path.name for path in kept.parent.iterdir()] == [name]
+            kept.unlink()
+
+    def test_plans_are_not_written_among_courses(self, folder: Path) -> None:
+        before = sorted(path.name for path in (folder / "courses").iterdir())
+        result = self.invoke("courses", "-o", "out/../courses")
+        assert result.exit_code == 2
+        assert "the courses are in this folder" in result.stderr
+        assert sorted(path.name for path in (folder / "courses").iterdir()) == before
+
     def test_a_folder_without_courses_is_refused(self, folder: Path) -> None:
         (folder / "empty").mkdir()
         result = self.invoke("empty", "-o", "out")

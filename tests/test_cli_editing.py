@@ -12,6 +12,7 @@ import peakflight as pf
 from peakflight import editing
 from peakflight.cli.application import application
 from peakflight.formats import write_crazyflie, write_samples
+from peakflight.readers import read_trajectory_file
 
 Run = Callable[..., Result]
 LIMITS = pf.Limits(speed=3.0, thrust_acceleration=14.0, jerk=50.0, snap=600.0)
@@ -233,6 +234,16 @@ class TestShow:
         result = run("show", "pieces.csv", "samples.csv", "other.json", "--delays", "0,9,0")
         assert result.exit_code == 0
         assert "3 drones, 3 pairs" in result.stdout
+
+    def test_how_far_off_samples_the_proof_is(self, run: Run) -> None:
+        fit = read_trajectory_file("samples.csv").fit_errors
+        assert fit is not None
+        arguments = ("show", "samples.csv", "other.json")
+        said = " ".join(run(*arguments).stdout.split())
+        assert f"off samples by {fit[0]:.1e} m, {fit[1]:.1e} m/s" in said
+        assert json.loads(run(*arguments, "--json").stdout)["fit_errors"] == [list(fit), None]
+        assert "(samples.csv)" in said
+        assert "samples" not in run("show", "plan.json", "other.json").stdout
 
     @pytest.mark.parametrize(
         ("arguments", "words"),

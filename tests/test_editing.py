@@ -241,6 +241,34 @@ def test_a_vehicle_and_its_rotors_stay(plain):
         )
 
 
+@pytest.mark.parametrize("change", ["under_limits", "retime", "join", "import"])
+def test_a_nose_about_which_nothing_is_said_follows_the_limits(plain, change, tmp_path):
+    rotors = pf.find_vehicle("crazyflie-2.1").on_rotors().limits
+    away = editing.move(plain, [5.0, 0.0, 0.0])
+
+    def changed(plan, limits):
+        if change == "under_limits":
+            return editing.under_limits(plan, limits)
+        if change == "retime":
+            return editing.retime(plan, limits=limits)
+        if change == "join":
+            return pf.join(plan, away, limits=limits)
+        plan.save(tmp_path / "plan.json")
+        return pf.import_trajectory(tmp_path / "plan.json", limits=limits, retime=True).plan
+
+    free = changed(editing.slow(plain, 0.5), rotors)
+    assert free.problem.heading.policy == "free"
+    assert free.yaw_motion is not None
+    assert not any("yaw motion" in line for line in free.report.problems)
+    assert "rotor_thrust" in free.report.peaks
+    back = changed(free, LIMITS)
+    assert not any("yaw motion" in line for line in back.report.problems)
+    assert back.problem.heading is None
+    assert back.yaw_motion is None
+    if change != "join":  # the transition under other limits is too fast for these
+        assert back.feasible, back.message
+
+
 def test_joint_plans_with_pieces_are_edited_too():
     made = pf.plan(WAYPOINTS, limits=LIMITS, method="joint", pieces=2, yaw="velocity")
     for change in (*KEEPING.values(), lambda plan: editing.delay(plan, 0.5)):
@@ -253,6 +281,9 @@ def test_joint_plans_with_pieces_are_edited_too():
         (lambda plan: editing.slow(plan, 0.0), "the pace is 0 %"),
         (lambda plan: editing.slow(plan, 1.2), "the pace is 120 %"),
         (lambda plan: editing.slow(plan, math.nan), "the pace is nan %"),
+        (lambda plan: editing.slow(plan, 1e-320), "change by a factor of inf"),
+        (lambda plan: editing.slow(plan, 1e-12), "every piece must last from"),
+        (lambda plan: editing.to_duration(plan, 5e-324), "change by a factor of 0"),
         (lambda plan: editing.to_duration(plan, -1.0), "the duration is -1 s"),
         (lambda plan: editing.delay(plan, 0.0), "the delay is 0 s"),
         (lambda plan: editing.rotate(plan, math.inf), "the angle is inf"),

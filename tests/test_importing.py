@@ -4,6 +4,7 @@ import pytest
 import peakflight as pf
 from peakflight.formats import write_crazyflie, write_samples
 from peakflight.importing import joint_jumps, repaired
+from peakflight.readers import TrajectoryFile
 
 LIMITS = pf.Limits(speed=3.0, thrust_acceleration=14.0, jerk=50.0, snap=600.0)
 WAYPOINTS = np.array([[0, 0, 1], [1, 0.5, 1.3], [2, -0.5, 1.0], [3, 0, 1.2]])
@@ -206,3 +207,40 @@ def test_yaw_limits_need_a_yaw(plan, tmp_path):
         with pytest.raises(pf.InvalidProblem, match="the file has no yaw"):
             pf.import_trajectory(tmp_path / name, limits=LIMITS, yaw_limits={"rate": 1.0})
     del plan
+
+
+def test_yaw_off_is_that_between_the_knots(tmp_path):
+    slow = pf.minimum_effort_spline(WAYPOINTS, np.full(3, 10.0 / 3.0))
+    flight = pf.Trajectory(slow.coefficients, slow.segment_times)
+    # one polynomial over all pieces, of a degree that is too high, turning at both ends
+    powers = np.zeros((1, 5, 1))
+    powers[0, :, 0] = [0.0, 3.0, 0.0, 0.0, 1e-4]
+    yaw = pf.Trajectory(powers, [flight.duration]).cut(flight.breakpoints[1:-1])
+    file = TrajectoryFile(trajectory=flight, yaw=yaw, form="made here")
+    found = pf.import_trajectory(file, limits=LIMITS)
+    times = np.linspace(0.0, flight.duration, 100_001)
+    off = np.abs(found.plan.yaw_motion(times) - yaw(times)).max()
+    assert found.yaw_off == pytest.approx(off, rel=0.05)
+    assert off <= 1e-3
+
+
+def test_a_yaw_that_jumps_is_said_to_be_off(tmp_path):
+    flight = pf.minimum_effort_spline(WAYPOINTS, np.full(3, 3.0))
+    angles = np.zeros((3, 5, 1))
+    angles[1, 0] = 1.0
+    angles[0, 4] = 1e-4
+    file = TrajectoryFile(
+        trajectory=flight, yaw=pf.Trajectory(angles, flight.segment_times), form="made here"
+    )
+    found = pf.import_trajectory(file, limits=LIMITS)
+    assert 0.5 < found.yaw_off < 1.5
+    assert len(found.plan.yaw_motion) <= 3 * 64
+
+
+def test_a_motion_under_limits_on_rotors_leaves_its_nose_free():
+    flight = pf.minimum_effort_spline(WAYPOINTS, np.full(3, 3.0))
+    file = TrajectoryFile(trajectory=flight, form="made here")
+    rotors = pf.find_vehicle("crazyflie-2.1").on_rotors().limits
+    made = pf.import_trajectory(file, limits=rotors).plan
+    assert made.problem.heading.policy == "free"
+    assert made.feasible, made.message

@@ -249,6 +249,10 @@ class TestJson:
                 '{"coefficients": [[[1, 2, 3]]], "segment_times": [1], "start_time": "x"}',
                 "wrong kind",
             ),
+            (
+                json.dumps({"coefficients": [[[0.0] * 3] * 13], "segment_times": [1]}),
+                "degree 12; 11 is the highest",
+            ),
             ('{"coefficients": [[[1, 2, 3]]], "waypoints": []}', "key 'status' is missing"),
         ],
     )

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import peakflight as pf
-from peakflight.separation import closest_approach
+from peakflight.separation import _nearest, closest_approach
 
 WITHIN = 1e-6
 """How near the proven bound promises to come to the distance, m."""
@@ -184,3 +184,39 @@ def test_turned_moved_and_backwards_together_drones_keep_their_distance(angle, o
     before = closest_approach(flights, separation=0.4, downwash=0.8)
     after = closest_approach(changed, separation=0.4, downwash=0.8, delays=delays)
     assert after.distance == pytest.approx(before.distance, abs=2 * WITHIN)
+
+
+def test_a_norm_that_overflows_proves_nothing():
+    flights = [line([-1, 0, 0], [1, 0, 0]), line([0, -1, 0], [0, 1, 0])]
+    for downwash in (1e-320, 1e-9, 1e9):
+        with pytest.raises(pf.InvalidProblem, match=r"downwash is .* from 1e-06 to 1e\+06 m"):
+            closest_approach(flights, separation=0.4, downwash=downwash)
+    coefficients = np.zeros((2, 3, 2, 3))
+    for index, flight in enumerate(flights):
+        coefficients[index, 0, 0] = flight.coefficients[0, 0]
+        coefficients[index, 1] = flight.coefficients[0]
+        coefficients[index, 2, 0] = flight(1.0)
+    breakpoints = np.array([[0.0, 0.0, 1.0, 1.0]] * 2)
+    for factor in (np.inf, np.nan):
+        scale = np.array([1.0, 1.0, factor])
+        assert _nearest(coefficients, breakpoints, np.array([3, 3]), scale)[1][0] == 0.0
+
+
+def test_flights_out_of_range_are_refused():
+    near, far = line([0, 0, 0], [1, 0, 0]), line([0, 0, 0], [1e160, 0, 0])
+    with pytest.raises(pf.InvalidProblem, match=r"piece 0 of plan 1 is not within 1e\+07 m"):
+        closest_approach([near, far])
+
+
+@pytest.mark.kernels
+def test_delays_are_exact_at_unix_times():
+    # 100 m/s towards each other in lanes 1 m apart, 0.1 s late: rounded, 1e-5 m off
+    start = 1.7e9
+    first = line([0, 0, 0], [100, 0, 0], start_time=start)
+    second = line([0.0, 1, 0], [100, 1, 0], start_time=start)
+    delays = [0.0, 0.0123456789]
+    found = closest_approach([first, second], delays=delays)
+    plain = closest_approach([first.shift(-start), second.shift(-start)], delays=delays)
+    assert found.distance == plain.distance
+    assert found.bound == plain.bound
+    np.testing.assert_array_equal(found.positions, plain.positions)

@@ -44,17 +44,15 @@ class Airframe:
             value = getattr(self, name)
             if value is None and name in NUMBERS[3:]:
                 continue
-            if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
-                raise InvalidProblem(f"airframe {name} is {value!r}; it must be a number")
-            if isinstance(value, int) and abs(value) > LARGEST:
-                raise InvalidProblem(f"airframe {name} is above {LARGEST:g}")
-            object.__setattr__(self, name, float(value))
+            object.__setattr__(self, name, _number(name, value))
             if not SMALLEST <= value <= LARGEST:
                 raise InvalidProblem(
                     f"airframe {name} is {value!r}; it must be from {SMALLEST:g} to {LARGEST:g}"
                 )
 
         object.__setattr__(self, "drag", _drag(self.drag))
+        uneven = _number("inertia_difference", self.inertia_difference)
+        object.__setattr__(self, "inertia_difference", uneven)
         if not 0.0 <= self.inertia_difference < self.inertia:
             raise InvalidProblem(
                 f"airframe inertia_difference is {self.inertia_difference!r}; it must be from 0 to "
@@ -127,6 +125,14 @@ class Airframe:
                 f"{', '.join(NUMBERS[3:])}, inertia_difference and drag"
             )
         return cls(**values)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.floating):
+        raise InvalidProblem(f"airframe {name} is {value!r}; it must be a number")
+    if isinstance(value, int) and abs(value) > LARGEST:
+        raise InvalidProblem(f"airframe {name} is above {LARGEST:g}")
+    return float(value)
 
 
 def _drag(values: Any) -> tuple[float, float]:

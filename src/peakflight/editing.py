@@ -22,7 +22,7 @@ from peakflight.errors import InvalidProblem, Status
 from peakflight.limits import UNBOUNDED, Limits
 from peakflight.problem import Problem, as_float_array
 from peakflight.result import Plan
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 from peakflight.version import __version__
 from peakflight.yaw import Heading
 
@@ -92,8 +92,14 @@ def keep_limits(plan: Plan) -> Plan:
 
 
 def under_limits(plan: Plan, limits: Limits) -> Plan:
-    """The same flight, proven against other limits; those of a vehicle are replaced as a whole."""
+    """The same flight, proven against other limits; those of a vehicle are replaced as a whole.
+
+    Limits on rotors decide what is asked of a nose about which nothing is said, and what its limits
+    are about: where that changes, the yaw is planned anew, or left out.
+    """
     problem = replace(plan.problem, limits=limits, vehicle=None)
+    if problem.heading != plan.problem.heading:
+        return steered(plan, problem, plan.trajectory, plan.pieces, "")
     return answer(plan, problem, plan.trajectory, plan.yaw_motion, "")
 
 
@@ -304,6 +310,13 @@ def continuity_at_rest(problem: Problem, state: object) -> int:
 def _stretched(plan: Plan, factor: float, note: str) -> Plan:
     """The path flown slower by a factor, and motion that is fixed at waypoints with it."""
     problem = plan.problem
+    times = plan.trajectory.segment_times
+    # compared without a product, which overflows
+    if not (SHORTEST / times.min() <= factor <= LONGEST / times.max()):
+        raise InvalidProblem(
+            f"the pace would change by a factor of {factor:.3g}; every piece must last from "
+            f"{SHORTEST:g} to {LONGEST:g} s"
+        )
 
     def slower(state: np.ndarray) -> np.ndarray:
         return state * float(factor) ** -np.arange(1.0, len(state) + 1.0)[:, None]

@@ -42,8 +42,12 @@ ROUNDED = (2e-2, 1e-1, 1.0)
 """Jumps that writing six decimals makes on pieces of some seconds: m, m/s, m/s^2."""
 YAW_TOLERANCE = 1e-3
 """How near a cubic yaw comes to one of a higher degree, rad."""
-YAW_SAMPLES = 64
-"""Points of a piece at which it does."""
+YAW_SAMPLES, MOST_YAW_SAMPLES = 64, 2**14
+"""Points of a piece that the cubic passes at first, and of all together at most."""
+BETWEEN = 8
+"""Points for each of them at which the difference is taken: most of them between knots."""
+WORTH = 0.6
+"""Part of the difference that twice the points have to leave: where a yaw jumps, none do."""
 HALVINGS = 4
 """How often pieces are halved to find waypoints apart in a motion whose joints are all alike."""
 CORRECTED = 33
@@ -193,11 +197,13 @@ def _of_plan(
     repair: bool,
 ) -> Plan:
     """A plan file under other limits, and with its joints mended."""
-    problem = plan.problem
+    problem, yaw = plan.problem, plan.yaw_motion
     if vehicle is not None:
         problem = replace(problem, vehicle=vehicle, limits=limits)  # type: ignore[arg-type]
     elif limits is not None:
         problem = replace(problem, vehicle=None, limits=limits)
+    # a nose about which nothing is said is free exactly where rotors are limited
+    is_new = plan.problem.yaw is None and problem.heading != plan.problem.heading
     if yaw_limits is not None:
         if problem.heading is None:
             raise InvalidProblem("yaw limits are given, and the file has no yaw")
@@ -211,8 +217,17 @@ def _of_plan(
         )
     else:
         flight = plan.trajectory
-    proof = _proof(problem, flight, plan.pieces, plan.yaw_motion)
-    return replace(plan, problem=problem, trajectory=flight, history=None, memory=None, **proof)
+    if is_new:
+        yaw = _free(problem, flight, plan.pieces)
+    return replace(
+        plan,
+        problem=problem,
+        trajectory=flight,
+        yaw_motion=yaw,
+        history=None,
+        memory=None,
+        **_proof(problem, flight, plan.pieces, yaw),
+    )
 
 
 def _of_motion(
@@ -237,6 +252,8 @@ def _of_motion(
         yaw=_heading(yaw, flight.breakpoints[borders], yaw_limits),
     )
     pieces = tuple(np.diff(borders).tolist())
+    if yaw is None:
+        yaw = _free(problem, flight, pieces)
     return Plan(
         problem=problem,
         method=METHOD,
@@ -247,6 +264,15 @@ def _of_motion(
         yaw_motion=yaw,
         **_proof(problem, flight, pieces, yaw),
     ), off
+
+
+def _free(problem: Problem, flight: Trajectory, pieces: tuple[int, ...]) -> Trajectory | None:
+    """Where a nose ends up about which nothing is said; None where nobody asks."""
+    if problem.heading is None:
+        return None
+    from peakflight.yaw_motion import turning
+
+    return turning(problem, flight, pieces).yaw
 
 
 def _proof(
@@ -302,14 +328,34 @@ def _cubic(yaw: Trajectory | None, flight: Trajectory) -> tuple[Trajectory | Non
     if not yaw.coefficients[:, 1:].any() and np.ptp(yaw.coefficients[:, 0]) == 0.0:
         constant = yaw.coefficients[:1, :1]
         return Trajectory(constant, [flight.duration], flight.start_time), 0.0  # type: ignore[arg-type]
-    local = np.linspace(0.0, 1.0, YAW_SAMPLES + 1)[:-1]
-    angles = yaw.sample(YAW_SAMPLES + 1)[:, :-1, 0].ravel()
-    times = (yaw.breakpoints[:-1, None] + yaw.segment_times[:, None] * local).ravel()
-    times = np.append(times, yaw.end_time)
-    angles = np.append(angles, yaw.sample(2)[-1, 1, 0])
-    cubic = through_angles(times, angles, YAW_TOLERANCE)
+    count = YAW_SAMPLES
+    best, off = _through(yaw, count)
+    while off > YAW_TOLERANCE and 2 * count * len(yaw) <= MOST_YAW_SAMPLES:
+        count *= 2
+        finer, left = _through(yaw, count)
+        if left > WORTH * off:
+            break
+        best, off = finer, left
+    return best, off
+
+
+def _through(yaw: Trajectory, count: int) -> tuple[Trajectory, float]:
+    """A cubic near so many points of each piece, and how far off it is between them too, rad."""
+    times, angles = _points(yaw, count)
+    times, angles = (
+        np.append(times[:, :-1], times[-1, -1]),
+        np.append(angles[:, :-1], angles[-1, -1]),
+    )
+    cubic = through_angles(times, angles, 0.5 * YAW_TOLERANCE)
+    times, angles = _points(yaw, BETWEEN * count)
     inside = np.clip(times, cubic.start_time, cubic.end_time)
-    return cubic, float(np.abs(cubic(inside)[:, 0] - angles).max())
+    return cubic, float(np.abs(cubic(inside)[:, :, 0] - angles).max())
+
+
+def _points(yaw: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(K, count+1) s and rad, both ends of each piece included."""
+    local = yaw.segment_times[:, None] * np.linspace(0.0, 1.0, count + 1)
+    return yaw.breakpoints[:-1, None] + local, yaw.sample(count + 1)[:, :, 0]
 
 
 def _heading(

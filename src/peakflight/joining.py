@@ -169,9 +169,9 @@ def _require_alike(first: Plan, second: Plan) -> None:
 
 def _heading(first: Plan, second: Plan, apart: bool) -> Heading | None:
     """What is asked of the yaw of both; their waypoints are `apart` where they are joined."""
+    if first.problem.yaw is None and second.problem.yaw is None:
+        return None  # then limits on rotors decide, in the whole as in its parts
     one, two = first.problem.heading, second.problem.heading
-    if one is None and two is None:
-        return None
     if one is not None and one == two and one.angles is None:
         return one
     angles = [part.yaw(part.waypoint_times) for part in (first, second)]

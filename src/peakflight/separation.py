@@ -6,24 +6,27 @@ in an ellipsoid's norm: with a separation s kept to the side and d above and bel
 least s.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from peakflight.course import FARTHEST
 from peakflight.errors import InvalidProblem
 from peakflight.kernels import bernstein, separation
 from peakflight.kernels.jit import fresh
 from peakflight.problem import as_float_array
 from peakflight.result import Plan
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import Trajectory, reach
 
 TOLERANCE = 5e-7
 """How near a proven bound comes to the distance that was found, m; rounding may take as much."""
 LARGEST_DELAY = 1e7
 """Delays, s: four months."""
+LEAST_KEPT, MOST_KEPT = 1e-6, 1e6
+"""Separations, m: below, rounding decides; beyond, drones are not near each other."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -95,9 +98,12 @@ def closest_approach(
     for index, flight in enumerate(flights):
         if flight.axes != 3:
             raise InvalidProblem(f"plan {index} has {flight.axes} axes; it must have three")
-    starts = np.array([flight.start_time for flight in flights]) + late
-    zero = float(starts.min())
-    begins = starts - zero
+        far = ~(reach(flight) <= FARTHEST)
+        if far.any():
+            raise InvalidProblem(
+                f"piece {int(far.argmax())} of plan {index} is not within {FARTHEST:g} m of zero"
+            )
+    zero, begins = _begins(flights, late)
     last = float(max(b + flight.duration for b, flight in zip(begins, flights, strict=True)))
     pieces = max(len(flight) for flight in flights) + 2
     degree = max(flight.degree for flight in flights)
@@ -123,7 +129,9 @@ def closest_approach(
         distance=float(found[worst, 1]),
         bound=float(bounds.min()),
         positions=_read_only(
-            np.array([_position(flights[k], when - late[k]) for k in (first, second)])
+            np.array(
+                [_position(flights[k], float(found[worst, 0]) - begins[k]) for k in (first, second)]
+            )
         ),
         separation=separation,
         downwash=separation if downwash is None else downwash,
@@ -151,8 +159,11 @@ def _nearest(
 def _scale(separation: float | None, downwash: float | None) -> np.ndarray:
     """(3,) factors of the axes in the norm."""
     for name, value in (("separation", separation), ("downwash", downwash)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise InvalidProblem(f"{name} is {value:g} m; it must be positive and finite")
+        if value is not None and not LEAST_KEPT <= value <= MOST_KEPT:
+            raise InvalidProblem(
+                f"{name} is {value:g} m; it must be positive, from {LEAST_KEPT:g} to "
+                f"{MOST_KEPT:g} m"
+            )
     if separation is None and downwash is not None:
         raise InvalidProblem("downwash is given without the separation to the side")
     ratio = 1.0 if separation is None or downwash is None else separation / downwash
@@ -169,9 +180,23 @@ def _delays(delays: ArrayLike | None, count: int) -> np.ndarray:
     return late
 
 
+def _begins(flights: Sequence[Trajectory], late: np.ndarray) -> tuple[float, np.ndarray]:
+    """When the first of them starts, s, and (n,) s how much later each does.
+
+    Rounded once, after the subtraction: sums of delays and Unix times have 2e-7 s between them.
+    """
+    starts = [
+        Fraction(flight.start_time) + Fraction(float(delay))
+        for flight, delay in zip(flights, late, strict=True)
+    ]
+    first = min(starts)
+    return float(first), np.array([float(start - first) for start in starts])
+
+
 def _position(flight: Trajectory, time: float) -> np.ndarray:
-    """(3,) m, also before and after the flight."""
-    return flight(min(max(time, flight.start_time), flight.end_time))
+    """(3,) m, at s since the start; also before and after the flight."""
+    flight = flight.shift(-flight.start_time)
+    return flight(min(max(time, 0.0), flight.end_time))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:

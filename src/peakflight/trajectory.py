@@ -316,6 +316,15 @@ class Trajectory:
         )
 
 
+def reach(motion: Trajectory) -> np.ndarray:
+    """(K,) a bound of the size of a motion on each piece; infinite where it has none."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        powers = motion.segment_times[:, None] ** np.arange(motion.degree + 1)
+        sizes = (np.abs(motion.coefficients) * powers[:, :, None]).sum(axis=1).max(axis=1)
+    result: np.ndarray = np.where(np.isnan(sizes), np.inf, sizes)
+    return result
+
+
 def _shift_origin(coefficients: np.ndarray, offset: np.ndarray) -> np.ndarray:
     """Coefficients (K, N+1, D) of the same polynomials around other origins (K,) (Taylor shift)."""
     powers = range(coefficients.shape[1])

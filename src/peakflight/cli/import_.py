@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -15,7 +15,7 @@ from peakflight.cli.options import (
     vehicle_option,
     written,
 )
-from peakflight.cli.output import Printout, print_json, seconds
+from peakflight.cli.output import Printout, amounts, print_json, seconds
 from peakflight.cli.progress import Progress
 from peakflight.cli.verdict import as_dict, change, end, print_verdict
 from peakflight.cli.yaw_options import parse_yaw_limits
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from peakflight.importing import Imported
 
 PLAN_FILE = "plan.json"
-WORDS = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"))
+WORDS = ("position", "velocity", "acceleration")
 SEEN = 1e-6
 """Difference of yaw that is worth a line, rad."""
 
@@ -120,7 +120,7 @@ def import_(
         if output is not None:
             with OutputFolder(output) as folder:
                 plan.save(folder.stage / PLAN_FILE)
-    jumps = dict(zip((word for word, _ in WORDS), found.jumps.tolist(), strict=True))
+    jumps = dict(zip(WORDS, found.jumps.tolist(), strict=True))
     notes = [*source.notes, *_jump_notes(found), *_yaw_notes(found.yaw_off)]
     if as_json:
         print_json(
@@ -153,10 +153,10 @@ def import_(
         )
     ]
     if source.fit_errors is not None:
-        rows.append(("fit", f"off the samples by {_amounts(source.fit_errors)} at most"))
+        rows.append(("fit", f"off the samples by {amounts(source.fit_errors)} at most"))
     rows.append(("joints", _about_joints(found, pieces)))
     if found.moved is not None:
-        rows.append(("repair", f"changed it by {_amounts(found.moved)} at most"))
+        rows.append(("repair", f"changed it by {amounts(found.moved)} at most"))
     if source.yaw is not None:
         limited = plan.problem.heading is not None and plan.problem.heading.limits
         rows.append(("yaw", "carried" if limited else "carried; nothing limits it"))
@@ -175,19 +175,13 @@ def import_(
     return end(file, plan)
 
 
-def _amounts(values: Any) -> str:
-    """Position, velocity and acceleration in words, as many as there are."""
-    parts = [f"{value:.1e} {unit}" for value, (_, unit) in zip(values, WORDS, strict=False)]
-    return ", ".join(parts)
-
-
 def _about_joints(found: "Imported", pieces: int) -> str:
     """How well the polynomials of the file meet."""
     if pieces == 1:
         return "none"
     if found.file_plan.report.joint_residual <= JOINT_TOLERANCE:
-        return f"meet; off by {_amounts(found.jumps)} at most"
-    return f"jump by {_amounts(found.jumps)} at most"
+        return f"meet; off by {amounts(found.jumps)} at most"
+    return f"jump by {amounts(found.jumps)} at most"
 
 
 def _jump_notes(found: "Imported") -> list[str]:

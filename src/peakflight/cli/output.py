@@ -15,6 +15,8 @@ from peakflight.result import BINDING
 NARROWEST, WIDEST = 80, 100
 """Columns that output is laid out for, whatever the terminal has."""
 STYLES = {"good": "bold green", "bad": "bold red", "title": "bold", "plain": ""}
+UNITS = ("m", "m/s", "m/s^2")
+"""Of position, velocity and acceleration."""
 
 
 class Printout:
@@ -84,6 +86,11 @@ def print_json(value: Any) -> None:
 def seconds(time: float) -> str:
     """Print a time in s."""
     return f"{time:.4f}" if 1e-2 <= time < 1e6 else f"{time:.6g}"
+
+
+def amounts(values: Iterable[float]) -> str:
+    """Print sizes of position, velocity and acceleration, as many as there are."""
+    return ", ".join(f"{value:.1e} {unit}" for value, unit in zip(values, UNITS, strict=False))
 
 
 def number(kind: LimitKind, value: float) -> str:

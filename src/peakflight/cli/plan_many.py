@@ -119,12 +119,15 @@ def plan_many(
     rows: dict[int, _Row] = {}
     with Progress() as progress:
         progress.stage(f"reading {len(paths)} courses")
+        _require_apart(output, courses)
         store = prepare_folder(output) / STORE_FILE
         if store.exists() and not resume:
             raise InvalidFile(
                 f"{store}: an earlier batch is in this folder; add --resume to go on with it, or "
                 "name another folder"
             )
+        if not store.exists():
+            _require_new(output, names)
         problems: dict[int, Problem] = {}
         for place, path in enumerate(paths):
             try:
@@ -179,6 +182,22 @@ def _course_files(given: Sequence[Path]) -> Iterator[Path]:
             endings = ", ".join(COURSE_ENDINGS)
             raise InvalidFile(f"{path}: holds no course, which would end in {endings}")
         yield from found
+
+
+def _require_apart(output: Path, courses: Sequence[Path]) -> None:
+    """An error if plans, which end as courses may, would be written among courses."""
+    for path in courses:
+        if path.is_dir() and path.resolve() == output.resolve():
+            raise InvalidFile(f"{output}: the courses are in this folder; name another for plans")
+
+
+def _require_new(output: Path, names: Sequence[str]) -> None:
+    """An error if files would be written over that no batch has made."""
+    for file in (TABLE_FILE, *(f"{name}{PLAN_ENDING}" for name in names)):
+        if (output / file).exists():
+            raise InvalidFile(
+                f"{output / file}: is there already, and not of a batch; name another folder"
+            )
 
 
 def _distinct(stems: Sequence[str]) -> list[str]:

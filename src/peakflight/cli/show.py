@@ -2,12 +2,12 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import click
 
 from peakflight.cli.options import common_options
-from peakflight.cli.output import Printout, print_json
+from peakflight.cli.output import Printout, amounts, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import quoted
 from peakflight.readers import read_trajectory_file
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 SHOWN = 10
 """Pairs in the table, the nearest first."""
+Fits: TypeAlias = dict[int, tuple[float, ...]]
+"""Number of a file of samples to how far off them its polynomials are, m, m/s, m/s^2."""
 DIGITS = 7
 """Decimals of a bound, which is good to 1e-6 m."""
 
@@ -92,16 +94,19 @@ def show(
     with Progress() as progress:
         from peakflight.separation import closest_approach
 
-        flights = []
+        flights, fits = [], {}
         for index, file in enumerate(files):
             progress.stage(f"reading {file.name}", index / len(files))
-            flights.append(read_trajectory_file(file).trajectory)
+            source = read_trajectory_file(file)
+            flights.append(source.trajectory)
+            if source.fit_errors is not None:
+                fits[index] = source.fit_errors
         progress.stage("measuring distances")
         found = closest_approach(flights, separation=separation, downwash=downwash, delays=delays)
     if as_json:
-        print_json(_as_dict(found, files))
+        print_json(_as_dict(found, files, fits))
     else:
-        _print(found, files)
+        _print(found, files, fits)
     if found.is_kept is False:
         one, two = (_name(files, number) for number in found.pair)
         click.echo(
@@ -113,7 +118,7 @@ def show(
     return 0
 
 
-def _print(found: "ClosestApproach", files: tuple[Path, ...]) -> None:
+def _print(found: "ClosestApproach", files: tuple[Path, ...], fits: Fits) -> None:
     out = Printout()
     out.line(f"{len(files)} drones, {len(found.pairs)} pairs", "title")
     if found.is_kept is not None:
@@ -133,6 +138,12 @@ def _print(found: "ClosestApproach", files: tuple[Path, ...]) -> None:
             ("there", f"({points[0]}) and ({points[1]}) m"),
         ]
     )
+    if fits:
+        worst = max(fits, key=lambda index: fits[index][0])
+        out.line(
+            "note: the proof is about polynomials, which are off samples by "
+            f"{amounts(fits[worst])} at most ({_name(files, worst)})"
+        )
     nearest = found.distances.argsort(kind="stable")[:SHOWN]
     out.table(
         "Pairs" if len(found.pairs) <= SHOWN else f"The {SHOWN} nearest pairs",
@@ -151,12 +162,13 @@ def _print(found: "ClosestApproach", files: tuple[Path, ...]) -> None:
     out.show()
 
 
-def _as_dict(found: "ClosestApproach", files: tuple[Path, ...]) -> dict[str, object]:
+def _as_dict(found: "ClosestApproach", files: tuple[Path, ...], fits: Fits) -> dict[str, object]:
     return {
         "kept": found.is_kept,
         "separation": found.separation,
         "downwash": found.downwash,
         "plans": [str(file) for file in files],
+        "fit_errors": [list(fits[index]) if index in fits else None for index in range(len(files))],
         "pair": list(found.pair),
         "time": found.time,
         "distance": found.distance,

@@ -59,7 +59,11 @@ def nearest(coefficients, breakpoints, counts, scale, tolerance, convert, produc
                         top -= 1
                         low, span = _least(waiting[top], product)
                         moved = 2 * coefficients.shape[2] * (depths[top] + 2) * EPSILON * span
-                        low = max(low - error - moved, 0.0)
+                        low = low - error - moved
+                        if not low < np.inf:  # numbers that overflow prove nothing
+                            bound = 0.0
+                            continue
+                        low = max(low, 0.0)
                         if low >= best - tolerance or depths[top] >= DEPTH or splits >= SPLITS:
                             bound = min(bound, low)
                             continue
@@ -80,7 +84,8 @@ def nearest(coefficients, breakpoints, counts, scale, tolerance, convert, produc
                 if breakpoints[b, j + 1] <= end:
                     j += 1
             found[pair, 0], found[pair, 1] = time, best
-            bounds[pair] = min(bound, best)
+            bound = min(bound, best)
+            bounds[pair] = bound if bound < np.inf else 0.0
             pair += 1
 
 
@@ -169,7 +174,7 @@ def _least(points, product):
     """What the norm of a polynomial is nowhere below, but for rounding; and the size of its points.
 
     Points (N+1, 3) are its control points; those of its squared norm have theirs as sums of
-    products.
+    products. Infinite where numbers overflow.
     """
     size = points.shape[0]
     degree = size - 1
@@ -185,7 +190,10 @@ def _least(points, product):
                 dot += term
                 gross += product[degree, i, k - i] * abs(term)
             total += product[degree, i, k - i] * dot
-        least = min(least, total - (2 * size + 8) * EPSILON * gross)
+        value = total - (2 * size + 8) * EPSILON * gross
+        if not value < np.inf:  # a minimum would pass over what is not a number
+            return np.inf, 0.0
+        least = min(least, value)
     for i in range(size):
         largest = max(largest, _norm(points[i]))
     return np.sqrt(max(least, 0.0)), largest

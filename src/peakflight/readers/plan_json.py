@@ -4,6 +4,7 @@ import re
 
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.files import PathLike, parse_json
+from peakflight.readers.pieces import MOST_POWERS
 from peakflight.readers.value import TrajectoryFile
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
@@ -35,6 +36,7 @@ def read(text: str, path: PathLike, tolerance: float) -> TrajectoryFile:
         )
     if "waypoints" in root:
         plan = Plan.from_dict(root)
+        _require_low_degree(plan.trajectory, path)
         return TrajectoryFile(
             trajectory=plan.trajectory, yaw=plan.yaw_motion, form="a plan file", plan=plan
         )
@@ -44,6 +46,7 @@ def read(text: str, path: PathLike, tolerance: float) -> TrajectoryFile:
         raise
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidFile(f"{path}: a key has a value of the wrong kind ({error})") from None
+    _require_low_degree(whole, path)
     if whole.axes not in (3, 4):
         raise InvalidFile(f"{path}: has {whole.axes} axes; it must be x, y, z, or x, y, z, yaw")
     times, start = whole.segment_times, whole.start_time
@@ -53,3 +56,10 @@ def read(text: str, path: PathLike, tolerance: float) -> TrajectoryFile:
         yaw=Trajectory(turning, times, start) if turning.any() else None,
         form="polynomial coefficients in JSON",
     )
+
+
+def _require_low_degree(motion: Trajectory, path: PathLike) -> None:
+    if motion.degree >= MOST_POWERS:
+        raise InvalidFile(
+            f"{path}: coefficients have degree {motion.degree}; {MOST_POWERS - 1} is the highest"
+        )

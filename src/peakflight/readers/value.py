@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from peakflight.course import FARTHEST
 from peakflight.errors import InvalidProblem
 from peakflight.result import Plan
-from peakflight.trajectory import Trajectory
+from peakflight.trajectory import Trajectory, reach
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,12 +48,3 @@ class TrajectoryFile:
                 raise InvalidProblem(
                     f"the {what} of piece {int(far.argmax())} is not within {FARTHEST:g} of zero"
                 )
-
-
-def reach(motion: Trajectory) -> np.ndarray:
-    """(K,) a bound of the size of a motion on each piece; infinite where it has none."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        powers = motion.segment_times[:, None] ** np.arange(motion.degree + 1)
-        sizes = (np.abs(motion.coefficients) * powers[:, :, None]).sum(axis=1).max(axis=1)
-    result: np.ndarray = np.where(np.isnan(sizes), np.inf, sizes)
-    return result
