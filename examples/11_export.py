@@ -10,7 +10,7 @@ course = pf.read_course("examples/courses/uzh_19wp.json")
 plan = pf.plan(course.waypoints, vehicle="crazyflie-2.1")
 print(f"{plan.duration:.3f} s in {len(plan.trajectory)} pieces")
 
-for name in ("crazyswarm", "crazyflie-compressed", "agilicious", "px4"):
+for name in ("crazyswarm", "crazyflie-compressed", "agilicious", "samples"):
     report = pf.export(plan, to=name, path=folder / name)
     (flight,) = report.flights
     assert report.feasible
