@@ -210,13 +210,14 @@ def test_flights_out_of_range_are_refused():
 
 @pytest.mark.kernels
 def test_delays_are_exact_at_unix_times():
-    # 100 m/s towards each other in lanes 1 m apart, 0.1 s late: rounded, 1e-5 m off
+    # two at 100 m/s that cross: a rounded delay is 1e-5 m
     start = 1.7e9
     first = line([0, 0, 0], [100, 0, 0], start_time=start)
-    second = line([0.0, 1, 0], [100, 1, 0], start_time=start)
+    second = line([50, -50, 0], [50, 50, 0], start_time=start)
     delays = [0.0, 0.0123456789]
     found = closest_approach([first, second], delays=delays)
     plain = closest_approach([first.shift(-start), second.shift(-start)], delays=delays)
+    assert found.distance == pytest.approx(100.0 * delays[1] / np.sqrt(2.0), abs=WITHIN)
     assert found.distance == plain.distance
     assert found.bound == plain.bound
     np.testing.assert_array_equal(found.positions, plain.positions)
