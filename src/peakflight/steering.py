@@ -3,14 +3,16 @@
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from peakflight.certificate import certify_answer
 from peakflight.limits import GRAVITY, KINDS
 from peakflight.problem import Problem
 from peakflight.result import Report
 from peakflight.trajectory import Trajectory
-from peakflight.yaw_motion import Turning, turning
+
+if TYPE_CHECKING:
+    from peakflight.yaw_motion import Turning
 
 SLOWER = 1.05
 """Largest factor by which a flight is slowed down at a time, where it cannot be told how much."""
@@ -52,6 +54,8 @@ def steered(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -
     """
     if problem.heading is None:
         return Steered(trajectory, certify_answer(problem, trajectory, pieces))
+    from peakflight.yaw_motion import turning  # it imports much of scipy
+
     turned = turning(problem, trajectory, pieces)
     note = ""
     if problem.heading.follows:
@@ -73,7 +77,7 @@ def steered(problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...]) -
 
 
 def _about_yaw(
-    problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...], turned: Turning, note: str
+    problem: Problem, trajectory: Trajectory, pieces: tuple[int, ...], turned: "Turning", note: str
 ) -> Steered:
     """Limits of the yaw itself: how much slower it needs the flight to be is known."""
     yaw, stretch = turned.yaw, turned.stretch
@@ -100,6 +104,8 @@ def _about_body(
     How the body turns about its thrust depends on gravity, so the yaw is found anew for every
     stretch. The least one that does is closed in between what did and what did not.
     """
+    from peakflight.yaw_motion import turning
+
     best: Steered | None = None
     lacking: dict[str, float] | None = None
     slow, fast = math.inf, 0.0
