@@ -21,8 +21,7 @@ from peakflight.formats.flight_files.skyc import keeps
 COURSES = Path(__file__).parent.parent / "examples" / "courses"
 PUBLIC = sorted(path for path in COURSES.iterdir() if path.suffix != ".md")
 CRAZYFLIES = [name for name in pf.VEHICLES if name.startswith("crazyflie")]
-MOST_TIME_LOST = 1.5
-"""Of the time, %, with 31 pieces where some 60 pay (18 legs, limits on angular acceleration)."""
+MOST_TIME_LOST = 0.5
 """Percent, for 31 pieces."""
 ON_CRAZYFLIE = {name for name, one in FLIGHT_FORMATS.items() if one.most_pieces is not None}
 
@@ -43,17 +42,19 @@ LIMITS = pf.Limits(speed=5.0, thrust_acceleration=12.4, jerk=62.0, snap=800.0)
 @pytest.fixture(scope="module")
 def long_plan() -> pf.Plan:
     """Of more pieces than a Crazyflie has room for."""
-    made = pf.plan(course("pmm_slalom.json"), limits=LIMITS, pieces=4)
+    made = pf.plan(course("pmm_slalom.json"), vehicle="crazyflie-2.1")
     assert len(made.trajectory) > 31
     return made
 
 
-def stated(name: str, plan: pf.Plan) -> float:
+def stated(name: str, plan: pf.Plan, flown: pf.Trajectory) -> float:
     """By how much a format may be off a flight, m, as it says itself."""
     precision = FLIGHT_FORMATS[name].precision
     farthest = float(np.abs(plan.trajectory.sample(50)).max())
     fastest = float(np.linalg.norm(plan.trajectory.sample(50, 1), axis=2).max())
-    on_axis = precision.position + precision.relative * farthest
+    powers = flown.segment_times[:, None, None] ** np.arange(flown.degree + 1)[:, None]
+    terms = float((np.abs(flown.coefficients) * powers).sum(axis=1).max())
+    on_axis = precision.position + precision.relative * farthest + precision.terms * terms
     return float(np.sqrt(3) * on_axis + precision.time * fastest)
 
 
@@ -78,21 +79,33 @@ def test_every_format_is_within_its_precision_and_tolerance(path: Path, tmp_path
         report = pf.export(flown, to=name, path=tmp_path / chosen.filename)
         (flight,) = report.flights
         assert report.feasible, (name, report.problems)
-        assert flight.rounding.position <= stated(name, flown), name
+        assert flight.rounding.position <= stated(name, flown, flight.trajectory), name
         assert max(flight.peaks[kind] for kind in flight.held) <= 1.0 + chosen.tolerance
         assert report.path.stat().st_size == report.size
         if chosen.most_pieces is not None and not chosen.coarse:
             assert flight.pieces <= 31
-            assert flight.cost <= MOST_TIME_LOST, name
+            assert flight.refitted or flight.cost <= MOST_TIME_LOST, name  # else as below
 
 
 @pytest.mark.parametrize("vehicle", CRAZYFLIES)
-def test_31_pieces_cost_little_on_every_crazyflie(vehicle: str, tmp_path: Path) -> None:
-    for name in ("pmm_slalom.json", "uzh_19wp.json"):
-        flown = pf.plan(course(name), vehicle=vehicle)
-        (flight,) = pf.export(flown, to="crazyswarm", path=tmp_path / "c.csv").flights
-        assert flight.pieces <= 31
-        assert flight.cost <= MOST_TIME_LOST
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pmm_slalom.json",
+        pytest.param(
+            "uzh_19wp.json",
+            marks=pytest.mark.xfail(
+                reason="under the default limits some 60 pieces pay: 31 cost 0.8 to 1.4 %",
+                strict=True,
+            ),
+        ),
+    ],
+)
+def test_31_pieces_cost_little_on_every_crazyflie(vehicle: str, name: str, tmp_path: Path) -> None:
+    flown = pf.plan(course(name), vehicle=vehicle)
+    (flight,) = pf.export(flown, to="crazyswarm", path=tmp_path / "c.csv").flights
+    assert flight.pieces <= 31
+    assert flight.cost <= MOST_TIME_LOST
 
 
 @pytest.mark.parametrize("name", FLIGHT_FORMATS)
@@ -150,10 +163,10 @@ def test_refit_says_what_it_costs(long_plan: pf.Plan, tmp_path: Path) -> None:
     assert flight.refitted
     assert flight.pieces == 31
     assert flight.plan_pieces == len(long_plan.trajectory)
-    assert flight.cost <= MOST_TIME_LOST
+    assert 0.0 < flight.cost <= MOST_TIME_LOST
     assert flight.rounding.position < 1e-5 < flight.difference.position
     count = len(long_plan.trajectory)
-    assert report.notes[0].startswith(f"planned again with 31 pieces in place of {count}: ")
+    assert report.notes[0].startswith(f"planned again with 31 pieces in place of {count}: 0.")
     for point in long_plan.problem.waypoints:
         times = flight.trajectory.breakpoints
         assert np.linalg.norm(flight.trajectory(times) - point, axis=1).min() < 1e-5

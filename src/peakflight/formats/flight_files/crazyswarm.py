@@ -145,9 +145,8 @@ FORMAT = FlightFormat(
     rules="degree 7; 31 pieces, all trajectories on board together",
     encode=single(encode),
     decode=decode,
-    # half a unit in the last place of single precision, some thirty times: the powers of a long
-    # piece are larger than their sum
-    precision=Precision(position=1e-6, time=1e-6, relative=2e-6),
+    # half a unit in the last place of single precision
+    precision=Precision(position=1e-6, time=1e-6, terms=6e-8),
     tolerance=1e-4,
     most_pieces=room,
 )

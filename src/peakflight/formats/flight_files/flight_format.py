@@ -40,6 +40,9 @@ class Precision(NamedTuple):
     """s by which joints may be earlier or later."""
     relative: float = 0.0
     """Part of the coordinate on each axis, m/m."""
+    terms: float = 0.0
+    """Part of the sum of the sizes of a polynomial's terms on each axis, m/m: coefficients round
+    one by one, however much of them cancels."""
 
 
 @dataclass(frozen=True, kw_only=True)
