@@ -45,7 +45,7 @@ def _run(scope: Scope, names: Sequence[str], output: Path) -> int:
         print(f"[bench] {name} ...", file=sys.stderr, flush=True)
         try:
             found = import_module(f"benchmarks.{name}").run(scope)
-        except Exception:
+        except Exception:  # one suite that fails does not take the others along
             crashes.append(name)
             traceback.print_exc()
             continue

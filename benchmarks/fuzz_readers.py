@@ -105,7 +105,7 @@ def outcome(path: Path) -> str:
         except pf.InvalidFile as error:
             clear = str(error).startswith(str(path)) and "\n" not in str(error)
             return "refused" if clear else f"unclear: {error}"
-        except Exception:
+        except Exception:  # what a reader must never raise, and what is looked for here
             return traceback.format_exc()
         for motion in (found.trajectory, found.yaw):
             if motion is not None and not np.isfinite(motion.sample(5)).all():

@@ -92,7 +92,7 @@ def _about_yaw(
             stretch, yaw = stretch * SLOWER, yaw.stretch(SLOWER)
             flight = trajectory.stretch(stretch)
             report = certify_answer(problem, flight, pieces, yaw=yaw)
-        note = _slower(stretch)
+        note = _slower(stretch, "the yaw limits")
     return Steered(flight, report, yaw, turned.deviation, note)
 
 
@@ -132,7 +132,7 @@ def _about_body(
             stretch = math.sqrt(max(fast, 1.0) * slow)
     if best is None:
         return found._replace(too_fast=not problem.is_at_rest, lacking=lacking or {})
-    cost = _slower(slow) if slow > CLOSE else ""
+    cost = _slower(slow, "the yaw and what it takes") if slow > CLOSE else ""
     return best._replace(note="; ".join(filter(None, (note, cost))), lacking=lacking or {})
 
 
@@ -182,5 +182,5 @@ def _excess(problem: Problem, report: Report) -> _Excess:
     return _Excess(stretch, of_rounding)
 
 
-def _slower(stretch: float) -> str:
-    return f"slowed down by {100.0 * (stretch - 1.0):.3g} % for the yaw limits"
+def _slower(stretch: float, why: str) -> str:
+    return f"slowed down by {100.0 * (stretch - 1.0):.3g} % for {why}"
