@@ -13,6 +13,7 @@ from peakflight.cli.progress import Progress
 from peakflight.cli.verdict import as_dict, change, end, print_verdict
 from peakflight.errors import InvalidFile, InvalidProblem, quoted
 from peakflight.limits import Limits
+from peakflight.numerals import as_number
 from peakflight.result import Plan
 
 ORDER = "peakflight.order"
@@ -32,9 +33,7 @@ class InOrder(click.Command):
 
 def _number(text: str, what: str) -> float:
     try:
-        if "_" in text:
-            raise ValueError
-        number = float(text)
+        number = as_number(text)
     except ValueError:
         raise InvalidProblem(f"{what} is {quoted(text)}; it must be a number") from None
     if not math.isfinite(number):

@@ -12,6 +12,7 @@ from peakflight.cli.options import FolderPath, common_options, vehicle_of
 from peakflight.cli.output import print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, quoted
+from peakflight.numerals import as_number
 from peakflight.result import Plan
 from peakflight.vehicle import Vehicle
 
@@ -218,9 +219,7 @@ FIELDS = {
 
 def _wind(text: str) -> tuple[float, ...]:
     try:
-        if "_" in text:
-            raise ValueError
-        return tuple(float(part) for part in text.split(","))
+        return tuple(as_number(part) for part in text.split(","))
     except ValueError:
         raise click.UsageError(
             f"--wind is {quoted(text)}; it must be three numbers, such as 2,0,0"

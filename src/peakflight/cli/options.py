@@ -9,6 +9,7 @@ import click
 
 from peakflight.errors import InvalidProblem, quoted
 from peakflight.limits import KINDS, ROTORS, LimitKind, Limits
+from peakflight.numerals import as_number
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES, find_vehicle
 
@@ -194,9 +195,7 @@ def _number(kind: LimitKind, text: str) -> float:
     is_angle = kind.unit == "rad"
     in_degrees = is_angle and text.endswith("deg")
     try:
-        if "_" in text:
-            raise ValueError
-        number = float(text.removesuffix("deg") if in_degrees else text)
+        number = as_number(text.removesuffix("deg") if in_degrees else text)
     except ValueError:
         also = ", or degrees such as 50deg" if is_angle else ""
         raise InvalidProblem(

@@ -10,6 +10,7 @@ from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, amounts, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import quoted
+from peakflight.numerals import as_number
 from peakflight.readers import read_trajectory_file
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ def _delays(
     delays = []
     for part in text.split(","):
         try:
-            if "_" in part:
-                raise ValueError
-            delays.append(float(part))
+            delays.append(as_number(part))
         except ValueError:
             raise click.BadParameter(
                 f"{quoted(part.strip())} is not a number of seconds", context, parameter

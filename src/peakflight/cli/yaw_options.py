@@ -9,6 +9,7 @@ import numpy as np
 
 from peakflight.cli.options import named_values
 from peakflight.errors import InvalidProblem, quoted
+from peakflight.numerals import as_number
 from peakflight.yaw import ABOUT, FIELDS, Heading
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -97,9 +98,9 @@ def parse_yaw(text: str) -> dict[str, Any]:
         return {"policy": text}
     try:
         if text.startswith(POINT):
-            x, y, z = (float(number) for number in text.removeprefix(POINT).split(","))
+            x, y, z = (as_number(number) for number in text.removeprefix(POINT).split(","))
             return {"policy": "point", "point": (x, y, z)}
-        angle = float(text.removesuffix("deg"))
+        angle = as_number(text.removesuffix("deg"))
     except ValueError:
         raise InvalidProblem(
             f"yaw is {quoted(text)}; it must be an angle in rad or such as 90deg, velocity, "

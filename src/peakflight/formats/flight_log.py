@@ -15,6 +15,7 @@ import numpy as np
 
 from peakflight.errors import InvalidFile, quoted
 from peakflight.files import PathLike, read_text
+from peakflight.numerals import is_finite_number
 
 SEPARATORS = (";", ",", "\t")
 """The first of them that is in the first line counts; else columns are separated by spaces."""
@@ -68,7 +69,7 @@ def read_flight_log(path: PathLike) -> FlightLog:
     line, text = rows[0]
     separator = next((mark for mark in SEPARATORS if mark in text), None)
     fields = text.split(separator)
-    if any(_is_number(field) for field in fields):
+    if any(is_finite_number(field) for field in fields):
         if len(fields) != len(COLUMNS):
             raise InvalidFile(
                 f"{path}: line {line} has {_columns(len(fields))}; without a header there must "
@@ -159,8 +160,8 @@ def _table(
                 if not missed or missed[-1] != line:
                     missed.append(line)
                 continue
-            if not _is_number(field):
-                hint = " with a decimal point" if _is_number(field.replace(",", ".")) else ""
+            if not is_finite_number(field):
+                hint = " with a decimal point" if is_finite_number(field.replace(",", ".")) else ""
                 raise InvalidFile(
                     f"{path}: line {line}: {COLUMNS[column]} is {quoted(field)}; it must be a "
                     f"finite number{hint}"
@@ -171,14 +172,6 @@ def _table(
 
 def _columns(count: int) -> str:
     return "1 column" if count == 1 else f"{count} columns"
-
-
-def _is_number(field: str) -> bool:
-    """Whether a field holds a finite number; unlike Python, CSV has no underscores in it."""
-    try:
-        return "_" not in field and math.isfinite(float(field))
-    except ValueError:
-        return False
 
 
 def _check_times(times: np.ndarray, lines: list[int], path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from peakflight.errors import InvalidFile, quoted
 from peakflight.files import PathLike
+from peakflight.numerals import as_number, is_number
 
 SEPARATORS = (";", ",", "\t")
 """The first of them that is in the first line counts; else columns are separated by spaces."""
@@ -55,7 +56,7 @@ def read_table(text: str, path: PathLike) -> Table:
     first = rows[0][1]
     separator = next((mark for mark in SEPARATORS if mark in first), None)
     titles: tuple[tuple[str, str], ...] = ()
-    if not any(map(_is_number, fields := _fields(first, separator))):
+    if not any(map(is_number, fields := _fields(first, separator))):
         titles = _titles(first, separator)
         rows = rows[1:]
     elif remark and len(above := _titles(remark, separator)) == len(fields):
@@ -102,25 +103,11 @@ def _fields(text: str, separator: str | None) -> list[str]:
     return fields
 
 
-def _is_number(text: str) -> bool:
-    try:
-        _parsed(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _parsed(text: str) -> float:
-    if "_" in text:  # Python has them in numbers, CSV has not
-        raise ValueError
-    return float(text)
-
-
 def _number(
     field: str, titles: tuple[tuple[str, str], ...], column: int, line: int, path: PathLike
 ) -> float:
     try:
-        number = _parsed(field)
+        number = as_number(field)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):

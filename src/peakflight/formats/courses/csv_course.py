@@ -19,6 +19,7 @@ from typing import NamedTuple
 from peakflight.course import Course
 from peakflight.errors import InvalidFile, quoted
 from peakflight.files import PathLike
+from peakflight.numerals import as_number, is_number
 
 SEPARATORS = (";", ",", "\t")
 """The first of them that is in the first line counts; else columns are separated by spaces."""
@@ -79,7 +80,7 @@ def read(text: str, path: PathLike) -> Course:
         raise InvalidFile(f"{path}: holds no waypoints, only comments")
     separator = next((mark for mark in SEPARATORS if mark in rows[0].text), None)
     titles = _titles(rows[0].text, separator)
-    if not any(_is_number(title) for title in titles):
+    if not any(is_number(title) for title in titles):
         columns, width = _named_columns(titles, rows[0].line, path), len(titles)
         rows = rows[1:]
         if not rows:
@@ -125,21 +126,6 @@ def _fields(text: str, separator: str | None) -> list[str]:
     while len(fields) > 1 and not fields[-1].strip():
         fields.pop()
     return fields
-
-
-def _is_number(text: str) -> bool:
-    try:
-        _number(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(text: str) -> float:
-    """The number that a field holds; unlike Python, CSV has no underscores in it."""
-    if "_" in text:
-        raise ValueError
-    return float(text)
 
 
 def _is_header(titles: list[str], fields: list[str]) -> bool:
@@ -196,7 +182,7 @@ def _refuse_ambiguous(rows: list[_Row], width: int, separator: str | None, path:
     previous = -math.inf
     for row in rows:
         first = _fields(row.text, separator)[0]
-        if not _is_number(first) or (value := _number(first)) <= previous:
+        if not is_number(first) or (value := as_number(first)) <= previous:
             return
         if previous == -math.inf and value != 0.0:
             return
@@ -217,12 +203,12 @@ def _numbers(
             f"{path}: line {row.line} has {_columns(len(fields))}, and the first line {width}"
         )
     try:
-        return [_number(fields[column.place]) * column.unit for column in columns]
+        return [as_number(fields[column.place]) * column.unit for column in columns]
     except ValueError:
         pass
-    wrong = next(column for column in columns if not _is_number(fields[column.place]))
+    wrong = next(column for column in columns if not is_number(fields[column.place]))
     field = fields[wrong.place].strip()
-    hint = " with a decimal point" if _is_number(field.replace(",", ".")) else ""
+    hint = " with a decimal point" if is_number(field.replace(",", ".")) else ""
     raise InvalidFile(
         f"{path}: line {row.line}: {wrong.name} is {quoted(field)}; it must be a number{hint}"
     )

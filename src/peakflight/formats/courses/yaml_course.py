@@ -8,6 +8,7 @@ from peakflight.course import Course
 from peakflight.errors import InvalidFile, MissingExtra, PeakflightError
 from peakflight.files import PathLike
 from peakflight.formats.tree import Entries, Items, Tree, course_from
+from peakflight.numerals import as_number
 
 DEEPEST = 32
 """Levels of lists and mappings that are followed; a course has four."""
@@ -151,6 +152,6 @@ def _scalar(event: Any) -> float | str | bool | None:
     if event.style:
         return text
     try:
-        return text if "_" in text else float(text)
+        return as_number(text)
     except ValueError:
         return WORDS.get(text.lower(), text)
