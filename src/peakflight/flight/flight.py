@@ -116,7 +116,7 @@ class Flight:
     @property
     def rms_error(self) -> float:
         """Root mean square of the distance from the plan while it lasts, m."""
-        return float(np.sqrt(np.mean(self._planned_errors**2)))
+        return root_mean_square(self._planned_errors)
 
     @property
     def top_error(self) -> float:
@@ -209,6 +209,11 @@ class Flight:
             "rms_error": self.rms_error,
             "top_error": self.top_error,
         }
+
+
+def root_mean_square(errors: np.ndarray) -> float:
+    """Of distances from a plan, m."""
+    return float(np.sqrt(np.mean(errors**2)))
 
 
 _ABOUT = ("duration", "saturation_share", "crash", "vehicle", "controller", "conditions")

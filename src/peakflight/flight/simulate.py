@@ -189,6 +189,14 @@ class Task:
             conditions=conditions,
         )
 
+    def errors(self, outcome: Outcome) -> np.ndarray:
+        """(S,) m, distance from the plan, at each step that was flown while it lasts."""
+        count = len(outcome.states)
+        flown = outcome.states[:, states.POSITION : states.VELOCITY]
+        planned = self.rehearsal.rows[:count, rows.PLANNED_POSITION : rows.PLANNED_VELOCITY]
+        lasts = self.rehearsal.times[:count] <= self.rehearsal.duration
+        return np.linalg.norm(flown - planned, axis=1)[lasts]
+
     def crash(self, outcome: Outcome) -> Crash | None:
         """Why it ended early, if it did."""
         if outcome.code == kernels.FLEW:

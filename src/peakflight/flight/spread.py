@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from peakflight.flight.conditions import LEAST_SCALE, LONGEST_LATENCY, MOST_SCALE, Conditions
+from peakflight.flight.flight import root_mean_square
 from peakflight.flight.numbers import number, whole
 from peakflight.flight.simulate import FlySettings, Task, prepare, run
-from peakflight.kernels.controllers import PLANNED_POSITION, PLANNED_VELOCITY
-from peakflight.kernels.rigid_body import POSITION, VELOCITY
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 from peakflight.vehicles import VehicleLike
@@ -212,17 +211,14 @@ def fly_spread(
 def _summary(task: Task, conditions: Conditions) -> SpreadFlight:
     """Fly once, and keep what a summary needs."""
     outcome = run(task, conditions)
+    errors = task.errors(outcome)
     count = len(outcome.states)
-    flown = outcome.states[:, POSITION:VELOCITY]
-    planned = task.rehearsal.rows[:count, PLANNED_POSITION:PLANNED_VELOCITY]
-    times = task.rehearsal.times[:count]
-    errors = np.linalg.norm(flown - planned, axis=1)[times <= task.rehearsal.duration]
     crash = task.crash(outcome)
     return SpreadFlight(
         conditions=conditions,
-        rms_error=float(np.sqrt(np.mean(errors**2))),
+        rms_error=root_mean_square(errors),
         top_error=float(errors.max()),
         saturation_share=outcome.saturated / count,
         crash=None if crash is None else crash.cause,
-        flown=float(times[-1]),
+        flown=float(task.rehearsal.times[count - 1]),
     )

@@ -8,10 +8,9 @@ import numpy as np
 
 from peakflight.errors import PeakflightError
 from peakflight.flight.conditions import Conditions
-from peakflight.flight.simulate import FlySettings, Outcome, Task, prepare, run
-from peakflight.kernels.controllers import PLANNED_POSITION, PLANNED_VELOCITY
+from peakflight.flight.flight import root_mean_square
+from peakflight.flight.simulate import FlySettings, prepare, run
 from peakflight.kernels.flight import FLEW
-from peakflight.kernels.rigid_body import POSITION, VELOCITY
 from peakflight.limits import Limits
 from peakflight.planner import plan
 from peakflight.problem import Problem
@@ -147,19 +146,9 @@ class Trying:
         worst = 0.0
         for one in conditions:
             outcome = run(task, one)
-            worst = max(worst, _rms_error(task, outcome))
+            worst = max(worst, root_mean_square(task.errors(outcome)))
             if outcome.code != FLEW:
                 return worst, False
             if worst > self.error:
                 break
         return worst, True
-
-
-def _rms_error(task: Task, outcome: Outcome) -> float:
-    """Distance from the plan while it lasts, m."""
-    count = len(outcome.states)
-    flown = outcome.states[:, POSITION:VELOCITY]
-    planned = task.rehearsal.rows[:count, PLANNED_POSITION:PLANNED_VELOCITY]
-    errors = flown - planned
-    errors = errors[task.rehearsal.times[:count] <= task.rehearsal.duration]
-    return float(np.sqrt(np.mean((errors**2).sum(axis=1))))
