@@ -6,12 +6,13 @@ from typing import Any
 
 import click
 
-from peakflight.cli.options import common_options, vehicle_of, written
-from peakflight.cli.output import Printout, amount, print_json
+from peakflight.cli.options import common_options, vehicle_of
+from peakflight.cli.output import Printout, print_json
 from peakflight.formats.vehicle_file import FIGURES, as_yaml
 from peakflight.limits import plain_unit
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES
+from peakflight.wording import amount, written
 
 
 @click.command(short_help="List vehicles, with the source of every figure.")
