@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from peakflight.palette import INK, LIMIT, SOFT
 from peakflight.result import Plan
 
 WIDTH = 7.16
@@ -32,12 +33,6 @@ CHARACTER = 0.6
 """Width of a character, relative to the size of the type; on the safe side for digits."""
 POWERS = (-4, 5)
 """Numbers at axes are written without a power of ten between 1e-4 and 1e5."""
-INK = "#1f1f1f"
-SOFT = "#767676"
-"""Marks that should not compete with the data."""
-FAINT = "#d4d4d4"
-LIMIT = "#b3261e"
-"""Limits: red in colour, dashed in grey."""
 
 
 def _without_its_palest_end() -> Colormap:

@@ -11,9 +11,7 @@ from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
     COLOURS,
-    INK,
     POINTS,
-    SOFT,
     TEXT,
     add_axes,
     even_step,
@@ -23,6 +21,7 @@ from peakflight.figures.canvas import (
 )
 from peakflight.figures.labels import Label, waypoint_labels
 from peakflight.figures.view import View, draw_box
+from peakflight.palette import INK, SOFT
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 

@@ -9,10 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from peakflight.figures.canvas import (
-    FAINT,
-    INK,
     POINTS,
-    SOFT,
     TEXT,
     WIDTH,
     add_axes,
@@ -24,6 +21,7 @@ from peakflight.figures.canvas import (
     write_title,
 )
 from peakflight.figures.flights import looks
+from peakflight.palette import FAINT, INK, SOFT
 
 ROW = 0.23
 """Height of a course, in; less if there are many."""

@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from peakflight.curves import sampled_curves
 from peakflight.errors import InvalidProblem
 from peakflight.figures.canvas import (
     COLOURS,
-    INK,
     WIDTH,
     draw_limit,
     name_lines,
@@ -26,10 +26,10 @@ from peakflight.figures.derivatives import (
     draw_borders,
     number_legs,
     panels_height,
-    sampled_curves,
     scale_panel,
 )
 from peakflight.limits import LimitKind
+from peakflight.palette import INK
 from peakflight.result import Plan
 
 THRUST = LimitKind("rotor_thrust", "N", 4, "rotor thrust")

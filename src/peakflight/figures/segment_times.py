@@ -13,9 +13,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from peakflight.figures.canvas import (
     COLOURS,
-    FAINT,
-    INK,
-    LIMIT,
     POINTS,
     TEXT,
     WIDTH,
@@ -26,6 +23,7 @@ from peakflight.figures.canvas import (
     write_headline,
     write_note,
 )
+from peakflight.palette import FAINT, INK, LIMIT
 from peakflight.result import BINDING, Plan
 from peakflight.yaw import ALL_LABELS
 
