@@ -37,8 +37,9 @@ from peakflight.figures import (
     save_figures,
     segment_times_figure,
 )
-from peakflight.figures.canvas import COLOURS, even_step, seconds
+from peakflight.figures.canvas import COLOURS, seconds
 from peakflight.figures.view import View
+from peakflight.labelling import even_step
 from peakflight.palette import FAINT, LIMIT
 
 LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)

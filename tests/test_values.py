@@ -951,7 +951,7 @@ def assert_same_plan(a, b):
         "message",
         "version",
     ]
-    for name in (*same, "version"):
+    for name in same:
         assert getattr(a, name) == getattr(b, name), name
     np.testing.assert_array_equal(a.trajectory.coefficients, b.trajectory.coefficients)
     np.testing.assert_array_equal(a.segment_times, b.segment_times)

@@ -161,14 +161,6 @@ def shortened(text: str, most: int) -> str:
     return text if len(text) <= most else "…" + text[1 - most :]
 
 
-def even_step(count: int, most: int) -> int:
-    """Find the least of 1, 2, 5, 10, ... that numbers `count` things with `most` labels."""
-    decade = 1
-    while count > most * 5 * decade:
-        decade *= 10
-    return next(step * decade for step in (1, 2, 5) if count <= most * step * decade)
-
-
 def text_width(text: str) -> float:
     """Estimate how wide a text of size `TEXT` is, pt."""
     return CHARACTER * TEXT * len(text)

@@ -14,13 +14,13 @@ from peakflight.figures.canvas import (
     POINTS,
     TEXT,
     add_axes,
-    even_step,
     new_figure,
     write,
     write_headline,
 )
 from peakflight.figures.labels import Label, waypoint_labels
 from peakflight.figures.view import View, draw_box
+from peakflight.labelling import even_step
 from peakflight.palette import INK, SOFT
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory

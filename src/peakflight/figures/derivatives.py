@@ -14,7 +14,6 @@ from peakflight.figures.canvas import (
     WIDTH,
     add_axes,
     draw_limit,
-    even_step,
     new_figure,
     span,
     text_width,
@@ -22,6 +21,7 @@ from peakflight.figures.canvas import (
     write_limit,
     write_note,
 )
+from peakflight.labelling import even_step
 from peakflight.limits import LimitKind, plain_unit
 from peakflight.palette import FAINT, INK, LIMIT, SOFT
 from peakflight.result import BINDING, Plan

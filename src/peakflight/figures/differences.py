@@ -13,7 +13,6 @@ from peakflight.figures.canvas import (
     TEXT,
     WIDTH,
     add_axes,
-    even_step,
     name_lines,
     new_figure,
     shortened,
@@ -21,6 +20,7 @@ from peakflight.figures.canvas import (
     write_title,
 )
 from peakflight.figures.flights import looks
+from peakflight.labelling import even_step
 from peakflight.palette import FAINT, INK, SOFT
 
 ROW = 0.23
