@@ -12,15 +12,30 @@ SAMPLES = 3000
 """About how many points a curve has."""
 PIECE_SAMPLES = (9, 200)
 """Fewest and most points to a polynomial piece."""
+INSIDE = 1e-6
+"""How far from its ends a time is inside a piece, relative to its duration."""
 
 
 def sampled_curves(
     trajectory: Trajectory, airframe: Airframe | None = None
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(K, n) s, and name of limit to (K, n): what it limits, densely enough for a curve."""
-    count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
+    count = _count(trajectory)
     local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
     return trajectory.breakpoints[:-1, None] + local, sampled_values(trajectory, count, airframe)
+
+
+def inner_times(trajectory: Trajectory) -> np.ndarray:
+    """(K, n) s, the times of `sampled_curves`, but of joints those just inside their two pieces.
+
+    A yaw has pieces of its own: at a joint, rounding says which piece of flight and yaw counts, and
+    one of the flight may meet one of the yaw that does not belong to it.
+    """
+    count = _count(trajectory)
+    parts = np.clip(np.linspace(0.0, 1.0, count), INSIDE, 1.0 - INSIDE)
+    local = trajectory.segment_times[:, None] * parts
+    times: np.ndarray = trajectory.breakpoints[:-1, None] + local
+    return times
 
 
 def sampled_values(
@@ -46,3 +61,8 @@ def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind
         for kind in KINDS
         if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
     ]
+
+
+def _count(trajectory: Trajectory) -> int:
+    """Points to a piece."""
+    return int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from peakflight.curves import sampled_curves
+from peakflight.curves import inner_times
 from peakflight.errors import InvalidProblem
 from peakflight.figures.canvas import (
     COLOURS,
@@ -58,7 +58,7 @@ def rotors_figure(plan: Plan) -> Figure:
         raise InvalidProblem("the plan has no vehicle, so nothing is known of its rotors")
     from peakflight.flatness import planned_states
 
-    times = sampled_curves(plan.trajectory)[0].ravel()
+    times = inner_times(plan.trajectory).ravel()
     states = planned_states(plan, times)
     least, most = map(_rounded, vehicle.rotor_thrust)
     across, about = map(_rounded, vehicle.body_rate) if vehicle.body_rate else (None, None)
