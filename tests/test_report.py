@@ -341,6 +341,24 @@ class TestCommand:
         assert Path("page.html").read_text() == page
         assert sorted(path.name for path in Path().iterdir()) == ["page.html", "plan.json"]
 
+    @pytest.mark.parametrize("spoil", [
+        lambda values: values["coefficients"][1][5].__setitem__(0, 1e200),
+        lambda values: values["coefficients"][1][5].__setitem__(0, 1e307),
+        lambda values: values.update(start_time=1e9),
+        lambda values: values.pop("yaw"),
+        lambda values: values.update(peaks={}),
+    ])  # fmt: skip
+    def test_a_plan_that_is_far_from_a_flight_has_a_page(
+        self, run: Callable[..., Result], on_rotors: pf.Plan, spoil: Callable[[Any], Any]
+    ) -> None:
+        values = on_rotors.to_dict()
+        spoil(values)
+        Path("odd.json").write_text(json.dumps(values))
+        result = run("odd.json")
+        assert result.exit_code == 1, result.stderr
+        assert result.stderr.count("\n") == 1
+        assert data_of(Path("report.html").read_text())["plots"]
+
     def test_says_where_as_json(self, run: Callable[..., Result], tmp_path: Path) -> None:
         said = json.loads(run(tmp_path / "plan.json", "--json").stdout)
         assert Path(said["report"]) == tmp_path / "report.html"

@@ -50,6 +50,7 @@ class Findings:
     """Of the derivatives that must not jump, from position on."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a file may be far from a flight
 def find(plan: Plan, claims: Mapping[str, Any] | None = None) -> Findings:
     """Prove a plan again and gather what there is to say of it.
 

@@ -58,13 +58,15 @@ def report_html(
     return report_page(find(plan, claims), title=title, file=file)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a file may be far from a flight
 def report_page(findings: Findings, *, title: str, file: str) -> str:
     """The page of what has been found of a plan; title and file as of `report_html`."""
     plan = findings.plan
     plots = _plots(findings)
     sections = list(_sections(findings, plots, file))
+    values = _without_infinity({"plots": plots, "themes": THEMES})
     # "<" is written so that no text ends the script that holds it
-    data = json.dumps({"plots": plots, "themes": THEMES}, allow_nan=False, separators=(",", ":"))
+    data = json.dumps(values, allow_nan=False, separators=(",", ":"))
     return _template().format(
         policy=POLICY,
         title=markup.text(f"{title}: {seconds(plan.duration)} s"),
@@ -88,6 +90,17 @@ def write_report(plan: Plan, path: PathLike, **options: Any) -> None:
         If the file cannot be written; one that was there before is then as it was.
     """
     write_atomically(path, report_html(plan, **options))
+
+
+def _without_infinity(value: Any) -> Any:
+    """The same with null, a gap in a plot, for numbers that JSON cannot hold."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, list):
+        return [_without_infinity(one) for one in value]
+    if isinstance(value, Mapping):
+        return {name: _without_infinity(one) for name, one in value.items()}
+    return value
 
 
 def _plots(findings: Findings) -> dict[str, Plot]:

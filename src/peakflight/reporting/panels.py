@@ -1,5 +1,6 @@
 """What a report draws against time: curves, and the bounds that they should keep."""
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from peakflight.curves import ALWAYS, inner_times, sampled_curves
 from peakflight.limits import KINDS, ROTORS, LimitKind, plain_unit
 from peakflight.result import BINDING, Plan
 from peakflight.yaw import Heading
+from peakflight.yaw_certificate import unfit
 
 LEASTS = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
 """Limits from below, which are drawn in the panel of the limit from above."""
@@ -87,14 +89,15 @@ def limit_panels(plan: Plan) -> Panels:
         marks = _marks(plan, kinds, curves)
         panels.append(Panel(kind.label, _unit(kind), tuple(drawn), bounds, marks))
     if plan.vehicle is not None:
-        panels.append(_rotor_panel(plan))
+        with suppress(ValueError):  # nothing is known of rotors where a file is far from a flight
+            panels.append(_rotor_panel(plan))
     return Panels(times.ravel(), tuple(panels))
 
 
 def yaw_panels(plan: Plan) -> Panels | None:
-    """Yaw, and what is limited of how it turns; None for a plan without a yaw motion."""
+    """Yaw, and what is limited of how it turns; None for a plan without a yaw that fits it."""
     heading, motion = plan.problem.heading, plan.yaw_motion
-    if heading is None or motion is None:
+    if heading is None or motion is None or unfit(heading, motion, plan.trajectory):
         return None
     from peakflight.twist import turning_about_z
 

@@ -4,6 +4,7 @@ A colour is written as the name of one of the page, such as "@ink": the page put
 its light or its dark dress. Nothing that a user wrote goes into a plot: Plotly would read markup.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
@@ -37,7 +38,7 @@ EYE = np.array([-0.45, -0.75, 0.48])
 """The direction from which the path in space is first seen, about a unit vector."""
 VISIBLE = (0.7, 0.36)
 """Half the width and height of what is seen from a distance of 1, in a plot as wide as two high."""
-NEARNESS = 1.12
+NEARNESS = 1.2
 """More distance than is just enough."""
 ROOM = 0.04
 """Around it, over the same."""
@@ -351,9 +352,9 @@ def _spans(points: np.ndarray) -> dict[str, tuple[list[float], float]]:
 
 def _eye(ratios: Sequence[float]) -> dict[str, float]:
     """From where all of a box with sides of these lengths is seen."""
-    across, up = 0.5 * float(np.hypot(*ratios[:2])), 0.5 * ratios[2]
+    across, up = 0.5 * math.hypot(ratios[0], ratios[1]), 0.5 * ratios[2]
     rising = float(EYE[2] / np.linalg.norm(EYE))
-    seen = across, across * rising + up * float(np.sqrt(1.0 - rising**2))
+    seen = across, across * rising + up * math.sqrt(1.0 - rising**2)
     distance = NEARNESS * max(half / most for half, most in zip(seen, VISIBLE, strict=True))
     return {name: float(value) for name, value in zip("xyz", distance * EYE, strict=True)}
 
