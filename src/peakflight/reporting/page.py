@@ -17,8 +17,11 @@ from peakflight.problem import derivative_name
 from peakflight.reporting import markup, tables
 from peakflight.reporting.commands import plan_command, plan_in_python
 from peakflight.reporting.findings import Findings, find
+from peakflight.reporting.leg_plots import legs_plot
+from peakflight.reporting.panel_plots import panels_plot
 from peakflight.reporting.panels import limit_panels, yaw_panels
-from peakflight.reporting.plots import Plot, above_plot, legs_plot, panels_plot, path_plot
+from peakflight.reporting.path_plots import above_plot, path_plot
+from peakflight.reporting.plots import Plot
 from peakflight.reporting.themes import THEMES, style_sheet
 from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan
 from peakflight.version import __version__
