@@ -1,9 +1,31 @@
-from collections.abc import Callable
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import peakflight as pf
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSER_ARGUMENTS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",  # WebGL in software: 3D is drawn without a graphics card
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+NEEDS_BROWSER = "PEAKFLIGHT_NEEDS_BROWSER"
+"""Environment variable with which tests that need a browser fail without one; CI sets it."""
+SCREENSHOTS = Path(__file__).parent.parent / "out" / "screenshots"
 
 
 def make_hand_plan(
@@ -65,3 +87,27 @@ def hermite_rows(duration: float, orders: int) -> np.ndarray:
 @pytest.fixture
 def hand_plan() -> Callable[..., pf.Plan]:
     return make_hand_plan
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, driven by Playwright; without it tests are left out."""
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        path = None
+    if path is None:
+        reason = f"needs one of {', '.join(BROWSERS)}, and playwright from the extra dev"
+        pytest.fail(reason) if os.environ.get(NEEDS_BROWSER) else pytest.skip(reason)
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=path, args=BROWSER_ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def screenshots() -> Path:
+    """Where pictures of pages go; CI keeps them."""
+    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
+    return SCREENSHOTS

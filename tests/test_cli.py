@@ -19,14 +19,14 @@ import peakflight.exporting.writing
 import peakflight.planner
 from peakflight.cli.application import application
 from peakflight.cli.folder import folder_for
-from peakflight.cli.options import parse_limits, written
-from peakflight.cli.output import ranges, seconds
+from peakflight.cli.options import parse_limits
 from peakflight.cli.plan_output import print_plan
 from peakflight.cli.progress import Progress
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.formats.flight_files import USUAL
 from peakflight.limits import PAPER_LIMITS
 from peakflight.methods import METHODS
+from peakflight.wording import ranges, seconds, written
 
 Run = Callable[..., Result]
 

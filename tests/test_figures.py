@@ -37,8 +37,11 @@ from peakflight.figures import (
     save_figures,
     segment_times_figure,
 )
-from peakflight.figures.canvas import COLOURS, FAINT, LIMIT, even_step, seconds
+from peakflight.figures.canvas import COLOURS, seconds
 from peakflight.figures.view import View
+from peakflight.labelling import even_step
+from peakflight.palette import FAINT, LIMIT
+from peakflight.planner import plan as solve
 
 LIMITS = Limits(speed=5.0, thrust_acceleration=15.5, jerk=62.0, snap=800.0)
 ALL_LIMITS = Limits(
@@ -645,6 +648,17 @@ def test_a_plan_with_a_vehicle_has_a_picture_of_its_rotors(tmp_path):
     assert names == ["rotor 1", "rotor 2", "rotor 3", "rotor 4"]
     for panel, rate in zip(panels[1:], vehicle.body_rate, strict=True):
         assert any(text.get_text().startswith(f"{rate:.4g} rad/s") for text in panel.texts)
+
+
+def test_rotors_are_drawn_within_what_is_proven():
+    """At joints too, where pieces of the flight and of its yaw must belong together."""
+    vehicle = VEHICLES["crazyflie-2.1-upgrade"].on_rotors()
+    made = solve(TWISTY, vehicle=vehicle, limits=Limits(speed=4.0), yaw="velocity")
+    assert made.feasible
+    panels = rotors_figure(made).axes[::-1]
+    thrusts = [line.get_ydata() for line in panels[0].lines if len(line.get_xdata()) > 2]
+    assert len(thrusts) == 4
+    assert np.max(thrusts) <= 0.18 + 1e-9
 
 
 @pytest.mark.kernels

@@ -570,6 +570,7 @@ def test_settings_are_options_of_plan():
     ]
     for other in others:
         assert other.pieces == (2,) * 4
+        assert other.settings == {"pieces": 2}
         np.testing.assert_array_equal(
             other.trajectory.coefficients, by_settings.trajectory.coefficients
         )

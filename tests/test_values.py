@@ -932,6 +932,7 @@ def full_plan(hand_plan, **changes):
         "history": History(segment_times=times, kappa=kappa),
         "iterations": 17,
         "wall_time_s": 0.1 + 0.2,
+        "settings": {"pieces": 2, "effort": 1e-5 / 3.0, "variant": "paper"},
         "report": some_report(peaks={"speed": [0.1, 0.2, 0.3, 1 / 3], "tilt": [1.0] * 4}),
         **changes,
     }
@@ -940,7 +941,17 @@ def full_plan(hand_plan, **changes):
 
 def assert_same_plan(a, b):
     assert_same_problem(a.problem, b.problem)
-    for name in ("method", "status", "pieces", "iterations", "wall_time_s", "message", "version"):
+    same = [
+        "method",
+        "status",
+        "pieces",
+        "iterations",
+        "wall_time_s",
+        "settings",
+        "message",
+        "version",
+    ]
+    for name in same:
         assert getattr(a, name) == getattr(b, name), name
     np.testing.assert_array_equal(a.trajectory.coefficients, b.trajectory.coefficients)
     np.testing.assert_array_equal(a.segment_times, b.segment_times)

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from peakflight.importing import Imported, import_trajectory
     from peakflight.joining import join
     from peakflight.planner import plan, replan
+    from peakflight.reporting import report_html, write_report
     from peakflight.separation import ClosestApproach, closest_approach
     from peakflight.spline import minimum_effort_spline
     from peakflight.tuning import TuneResult, TuneSettings, tune
@@ -111,10 +112,12 @@ __all__ = [
     "read_trajectory",
     "read_trajectory_file",
     "replan",
+    "report_html",
     "states_along",
     "stretch_to_limits",
     "tidy",
     "tune",
+    "write_report",
 ]
 
 _LAZY = {
@@ -151,9 +154,11 @@ _LAZY = {
     "plan_many": "peakflight.batch",
     "planned_states": "peakflight.flatness",
     "replan": "peakflight.planner",
+    "report_html": "peakflight.reporting",
     "states_along": "peakflight.flatness",
     "stretch_to_limits": "peakflight.certificate",
     "tune": "peakflight.tuning",
+    "write_report": "peakflight.reporting",
 }
 
 

@@ -2,7 +2,7 @@
 
 import logging
 import time
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,7 @@ def plan(
         pieces=pieces,
         iterations=outcome.iterations,
         wall_time_s=time.perf_counter() - began,
+        settings=_chosen(settings),
         message="; ".join(line for line in lines if line),
         history=outcome.history,
         yaw_motion=flight.yaw,
@@ -195,6 +196,16 @@ def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outco
     answered = outcome.problem or problem
     pieces = outcome.pieces or (1,) * (len(answered.waypoints) - 1)
     return outcome, steered(answered, outcome.trajectory, pieces)
+
+
+def _chosen(settings: Any) -> dict[str, Any]:
+    """What differs from the defaults, as far as a file can hold it."""
+    values = {one.name: (getattr(settings, one.name), one.default) for one in fields(settings)}
+    return {
+        name: value
+        for name, (value, default) in values.items()
+        if isinstance(value, str | int | float) and value != default
+    }
 
 
 def _fields(kind: Any) -> set[str]:

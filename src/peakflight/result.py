@@ -121,6 +121,8 @@ class Plan:
     """Iterations of the method."""
     wall_time_s: float
     """Time that planning took, s."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of the method that are not its defaults, as far as they are numbers and names."""
     message: str = ""
     """What the user should know: why there is no solution, what was merged, ..."""
     history: History | None = field(default=None, repr=False)
@@ -187,6 +189,7 @@ class Plan:
             "iterations": self.iterations,
             "wall_time_s": self.wall_time_s,
             "version": self.version,
+            "settings": dict(self.settings),
             "start_time": self.trajectory.start_time,
             "message": self.message,
             "feasible": self.report.feasible,
@@ -281,6 +284,7 @@ class Plan:
             pieces=pieces,
             iterations=int(values["iterations"]),
             wall_time_s=float(values["wall_time_s"]),
+            settings=dict(values.get("settings", {})),
             message=str(values.get("message", "")),
             history=None if history is None else History(**history),
             yaw_motion=motion,

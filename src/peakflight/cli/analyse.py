@@ -9,13 +9,14 @@ import click
 
 from peakflight.cli.folder import OutputFolder
 from peakflight.cli.options import FolderPath, common_options
-from peakflight.cli.output import Printout, amount, print_json, seconds
+from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
 from peakflight.files import write_atomically
 from peakflight.formats.flight_log import read_flight_log
 from peakflight.limits import KINDS
 from peakflight.result import Plan
+from peakflight.wording import amount, seconds
 
 if TYPE_CHECKING:
     from peakflight.flight.motion_capture import FlightAnalysis

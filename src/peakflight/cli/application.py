@@ -34,6 +34,7 @@ from peakflight.cli.output import print_json
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
 from peakflight.cli.plan_many import plan_many
+from peakflight.cli.report import report
 from peakflight.cli.show import show
 from peakflight.cli.tune import tune
 from peakflight.cli.vehicles import vehicles
@@ -118,6 +119,7 @@ application.add_command(compare)
 application.add_command(edit)
 application.add_command(import_)
 application.add_command(show)
+application.add_command(report)
 application.add_command(fly)
 application.add_command(paper)
 application.add_command(tune)

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from peakflight.cli.options import limits_source, written
-from peakflight.cli.output import Printout, seconds
+from peakflight.cli.options import limits_source
+from peakflight.cli.output import Printout
 from peakflight.limits import Limits
 from peakflight.vehicle import Vehicle
+from peakflight.wording import seconds, written
 from peakflight.yaw import ALL_LABELS
 
 if TYPE_CHECKING:

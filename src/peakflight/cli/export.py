@@ -8,12 +8,13 @@ from typing import Any
 import click
 
 from peakflight.cli.options import common_options
-from peakflight.cli.output import Printout, print_json, ratio_cells, seconds
+from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.formats.flight_files import OTHER_NAMES, find_format
 from peakflight.result import Plan
+from peakflight.wording import ratio_cells, seconds
 from peakflight.yaw import ALL_LABELS
 
 

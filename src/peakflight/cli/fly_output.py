@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from peakflight.cli.output import Printout, seconds
+from peakflight.cli.output import Printout
 from peakflight.result import Plan
+from peakflight.wording import seconds
 
 if TYPE_CHECKING:
     from peakflight.flight import Conditions, Flight, SpreadResult

@@ -13,9 +13,8 @@ from peakflight.cli.options import (
     limits_option,
     limits_source,
     vehicle_option,
-    written,
 )
-from peakflight.cli.output import Printout, amounts, print_json, seconds
+from peakflight.cli.output import Printout, amounts, print_json
 from peakflight.cli.progress import Progress
 from peakflight.cli.verdict import as_dict, change, end, print_verdict
 from peakflight.cli.yaw_options import parse_yaw_limits
@@ -25,6 +24,7 @@ from peakflight.methods import METHODS
 from peakflight.readers import TOLERANCE, read_trajectory_file
 from peakflight.result import JOINT_TOLERANCE
 from peakflight.vehicle import Vehicle
+from peakflight.wording import seconds, written
 
 if TYPE_CHECKING:
     from peakflight.importing import Imported

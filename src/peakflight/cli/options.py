@@ -12,6 +12,7 @@ from peakflight.limits import KINDS, ROTORS, LimitKind, Limits
 from peakflight.numerals import as_number
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES, find_vehicle
+from peakflight.wording import written
 
 ON_ROTORS = "peakflight.on_rotors"
 """Where a command keeps whether `--rotors` was given."""
@@ -62,16 +63,6 @@ def named_values(text: str, kinds: Mapping[str, LimitKind]) -> dict[str, float]:
             raise InvalidProblem(f"limit {name} is given twice")
         values[name] = _number(kinds[name], value)
     return values
-
-
-def written(limits: Limits, separator: str = ",") -> str:
-    """Limits as `parse_limits` reads them."""
-    items = []
-    for kind in limits.active:
-        value = getattr(limits, kind.name)
-        number = f"{math.degrees(value):.10g}deg" if kind.unit == "rad" else f"{value:.10g}"
-        items.append(f"{kind.name}={number}")
-    return separator.join(items)
 
 
 def limits_source(vehicle: Vehicle | None, given: Limits | None) -> str:

@@ -1,16 +1,11 @@
 """What commands print: tables for people, one JSON object for machines."""
 
 import json
-import math
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import click
-
-from peakflight.limits import UNBOUNDED, LimitKind
-from peakflight.problem import Problem
-from peakflight.result import BINDING
 
 NARROWEST, WIDEST = 80, 100
 """Columns that output is laid out for, whatever the terminal has."""
@@ -83,59 +78,6 @@ def print_json(value: Any) -> None:
     click.echo(json.dumps(value, allow_nan=False))
 
 
-def seconds(time: float) -> str:
-    """Print a time in s."""
-    return f"{time:.4f}" if 1e-2 <= time < 1e6 else f"{time:.6g}"
-
-
 def amounts(values: Iterable[float]) -> str:
     """Print sizes of position, velocity and acceleration, as many as there are."""
     return ", ".join(f"{value:.1e} {unit}" for value, unit in zip(values, UNITS, strict=False))
-
-
-def number(kind: LimitKind, value: float) -> str:
-    """Print a value of a kind of limit; angles in degrees."""
-    return f"{math.degrees(value) if kind.unit == 'rad' else value:.6g}"
-
-
-def amount(kind: LimitKind, value: float) -> str:
-    """Print a value of a kind of limit with its unit; angles in degrees."""
-    return f"{number(kind, value)} {'deg' if kind.unit == 'rad' else kind.unit}"
-
-
-def attained(problem: Problem, kind: LimitKind, ratio: float) -> float | None:
-    """Value that a certified ratio stands for, in the unit of its kind; None where unbounded."""
-    if kind in problem.limits.active:
-        return problem.limits.attained(kind, ratio)
-    return problem.allowed[kind] * ratio if ratio < UNBOUNDED else None
-
-
-def rotor_notes(problem: Problem) -> tuple[str, ...]:
-    """What limits on rotors are proven for, if there are any."""
-    if not problem.limits.on_rotors:
-        return ()
-    nose = "the yaw of the plan" if problem.heading else "a heading that does not twist"
-    return (f"rotor thrusts are proven for {nose}, with drag",)
-
-
-def ratio_cells(ratio: float) -> tuple[str, str, str]:
-    """A ratio to a limit, the distance to the limit, and what that means in a word."""
-    if ratio >= UNBOUNDED:
-        return "no bound", "", "exceeded"
-    if ratio > 1.0:
-        return f"{ratio:.6g}", f"{100.0 * (1.0 - ratio):.3g} %", "exceeded"
-    return f"{ratio:.4f}", f"{100.0 * (1.0 - ratio):.2f} %", "binds" if ratio >= BINDING else ""
-
-
-def ranges(numbers: Sequence[int], most: int = 8) -> str:
-    """Rising numbers as `0-3, 7`; of many parts the first, and how many numbers there are."""
-    parts: list[list[int]] = []
-    for number in numbers:
-        if parts and number == parts[-1][1] + 1:
-            parts[-1][1] = number
-        else:
-            parts.append([number, number])
-    texts = [str(first) if first == last else f"{first}-{last}" for first, last in parts]
-    if len(texts) > most:
-        return f"{', '.join(texts[:most])}, ... ({len(numbers)} in all)"
-    return ", ".join(texts) or "none"

@@ -20,9 +20,8 @@ from peakflight.cli.options import (
     limits_source,
     spline_options,
     vehicle_option,
-    written,
 )
-from peakflight.cli.output import Printout, print_json, seconds
+from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, PeakflightError
 from peakflight.files import prepare_folder, write_atomically
@@ -31,6 +30,7 @@ from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.vehicle import Vehicle
 from peakflight.version import __version__
+from peakflight.wording import seconds, written
 
 if TYPE_CHECKING:
     from peakflight.batch import BatchResult

@@ -3,21 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
-from peakflight.cli.options import limits_source, written
-from peakflight.cli.output import (
-    Printout,
-    amount,
-    attained,
-    number,
-    ratio_cells,
-    rotor_notes,
-    seconds,
-)
+from peakflight.cli.options import limits_source
+from peakflight.cli.output import Printout
 from peakflight.cli.yaw_options import written_yaw
 from peakflight.limits import Limits
 from peakflight.result import Plan
+from peakflight.summary import leg_summaries, limit_summaries
+from peakflight.wording import amount, number, ratio_cells, rotor_notes, seconds, written
 from peakflight.yaw import ALL_LABELS
 
 MOST_LEGS = 40
@@ -104,34 +96,23 @@ def _print_notes(out: Printout, notes: Sequence[str]) -> None:
 
 def _legs(plan: Plan) -> Iterator[Sequence[str] | None]:
     """Each leg's time and the limit that binds it, or comes closest to."""
-    times = np.diff(plan.waypoint_times)
-    first = np.cumsum((0, *plan.pieces[:-1]))
-    names = list(plan.report.peaks)
-    kappa = np.array([np.maximum.reduceat(plan.report.peaks[name], first) for name in names])
-    closest = kappa.argmax(axis=0)
-    legs = len(times)
-    for leg in range(legs):
-        if legs > MOST_LEGS and ENDS <= leg < legs - ENDS:
-            if leg == ENDS:
+    legs = leg_summaries(plan)
+    for index, leg in enumerate(legs):
+        if len(legs) > MOST_LEGS and ENDS <= index < len(legs) - ENDS:
+            if index == ENDS:
                 yield None
             continue
-        ratio, margin, meaning = ratio_cells(float(kappa[closest[leg], leg]))
-        name = ALL_LABELS[names[closest[leg]]]
-        yield str(leg), seconds(float(times[leg])), name, ratio, margin, meaning
+        ratio, margin, meaning = ratio_cells(leg.ratio)
+        yield str(index), seconds(leg.time), ALL_LABELS[leg.closest], ratio, margin, meaning
 
 
 def _worst(plan: Plan) -> Iterator[Sequence[str]]:
     """The worst ratio of each limit, and the leg where it is."""
-    legs = np.repeat(np.arange(len(plan.pieces)), plan.pieces)
-    for kind, limit in plan.problem.allowed.items():
-        kappa = plan.report.peaks[kind.name]
-        segment = int(kappa.argmax())
-        worst = float(kappa[segment])
-        reached = attained(plan.problem, kind, worst)
+    for one in limit_summaries(plan):
         yield (
-            kind.label,
-            amount(kind, limit),
-            "" if reached is None else number(kind, reached),
-            *ratio_cells(worst),
-            str(legs[segment]),
+            one.kind.label,
+            amount(one.kind, one.limit),
+            "" if one.reached is None else number(one.kind, one.reached),
+            *ratio_cells(one.ratio),
+            str(one.leg),
         )

@@ -10,14 +10,8 @@ import click
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.fly import check_error
 from peakflight.cli.folder import OutputFolder
-from peakflight.cli.options import (
-    FolderPath,
-    common_options,
-    limits_option,
-    vehicle_of,
-    written,
-)
-from peakflight.cli.output import Printout, print_json, seconds
+from peakflight.cli.options import FolderPath, common_options, limits_option, vehicle_of
+from peakflight.cli.output import Printout, print_json
 from peakflight.cli.plan import draw_plan, file_summaries, write_plan_files
 from peakflight.cli.progress import Progress
 from peakflight.cli.yaw_options import heading_of, yaw_options
@@ -25,6 +19,7 @@ from peakflight.errors import InvalidFile, InvalidProblem, MissingExtra
 from peakflight.files import write_json
 from peakflight.limits import Limits
 from peakflight.vehicle import Vehicle
+from peakflight.wording import seconds, written
 
 if TYPE_CHECKING:
     from peakflight.tuning import Point, TuneResult

@@ -6,12 +6,13 @@ from typing import Any
 
 import click
 
-from peakflight.cli.options import common_options, vehicle_of, written
-from peakflight.cli.output import Printout, amount, print_json
-from peakflight.formats.vehicle_file import FIGURES, as_yaml
+from peakflight.cli.options import common_options, vehicle_of
+from peakflight.cli.output import Printout, print_json
+from peakflight.formats.vehicle_file import FIGURES, as_yaml, shown_figure
 from peakflight.limits import plain_unit
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES
+from peakflight.wording import amount, written
 
 
 @click.command(short_help="List vehicles, with the source of every figure.")
@@ -83,16 +84,8 @@ def _print_one(vehicle: Vehicle) -> None:
 
 
 def _figures(vehicle: Vehicle) -> Iterator[Sequence[str]]:
-    for name, (unit, _) in FIGURES.items():
-        value = getattr(vehicle, name)
-        shown = "unknown" if value is None else f"{_shown(value)} {plain_unit(unit)}"
-        yield name, shown.strip(), vehicle.sources.get(name, "")
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, tuple):
-        return ("; " if isinstance(value[0], tuple) else ", ").join(map(_shown, value))
-    return f"{value:.4g}"
+    for name in FIGURES:
+        yield name, shown_figure(vehicle, name), vehicle.sources.get(name, "")
 
 
 def _limits(vehicle: Vehicle) -> Iterator[Sequence[str]]:

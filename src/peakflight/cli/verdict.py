@@ -5,17 +5,10 @@ from typing import Any
 
 import click
 
-from peakflight.cli.output import (
-    Printout,
-    amount,
-    attained,
-    number,
-    ranges,
-    ratio_cells,
-    rotor_notes,
-    seconds,
-)
+from peakflight.cli.output import Printout
 from peakflight.result import Plan, Report
+from peakflight.summary import limit_summaries
+from peakflight.wording import amount, number, ranges, ratio_cells, rotor_notes, seconds
 
 COLUMNS = ("limit", ">allowed", ">reached", ">ratio", ">margin", "", "segments")
 """Of a table of limits."""
@@ -23,15 +16,13 @@ COLUMNS = ("limit", ">allowed", ">reached", ">ratio", ">margin", "", "segments")
 
 def limit_rows(plan: Plan, report: Report) -> Iterator[Sequence[str]]:
     """A row for each limit: what is allowed, what is reached, and where it binds."""
-    for kind, limit in plan.problem.allowed.items():
-        worst = float(report.peaks[kind.name].max())
-        reached = attained(plan.problem, kind, worst)
+    for one in limit_summaries(plan, report):
         yield (
-            kind.label,
-            amount(kind, limit),
-            "" if reached is None else number(kind, reached),
-            *ratio_cells(worst),
-            ranges(report.binding_segments(kind.name)),
+            one.kind.label,
+            amount(one.kind, one.limit),
+            "" if one.reached is None else number(one.kind, one.reached),
+            *ratio_cells(one.ratio),
+            ranges(one.binding),
         )
 
 

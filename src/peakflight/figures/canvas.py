@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from peakflight.palette import INK, LIMIT, SOFT
 from peakflight.result import Plan
 
 WIDTH = 7.16
@@ -32,12 +33,6 @@ CHARACTER = 0.6
 """Width of a character, relative to the size of the type; on the safe side for digits."""
 POWERS = (-4, 5)
 """Numbers at axes are written without a power of ten between 1e-4 and 1e5."""
-INK = "#1f1f1f"
-SOFT = "#767676"
-"""Marks that should not compete with the data."""
-FAINT = "#d4d4d4"
-LIMIT = "#b3261e"
-"""Limits: red in colour, dashed in grey."""
 
 
 def _without_its_palest_end() -> Colormap:
@@ -164,14 +159,6 @@ def seconds(duration: float) -> str:
 def shortened(text: str, most: int) -> str:
     """Leave out the beginning of a text of more than `most` characters."""
     return text if len(text) <= most else "…" + text[1 - most :]
-
-
-def even_step(count: int, most: int) -> int:
-    """Find the least of 1, 2, 5, 10, ... that numbers `count` things with `most` labels."""
-    decade = 1
-    while count > most * 5 * decade:
-        decade *= 10
-    return next(step * decade for step in (1, 2, 5) if count <= most * step * decade)
 
 
 def text_width(text: str) -> float:

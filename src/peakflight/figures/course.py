@@ -11,18 +11,17 @@ from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
     COLOURS,
-    INK,
     POINTS,
-    SOFT,
     TEXT,
     add_axes,
-    even_step,
     new_figure,
     write,
     write_headline,
 )
 from peakflight.figures.labels import Label, waypoint_labels
 from peakflight.figures.view import View, draw_box
+from peakflight.labelling import even_step
+from peakflight.palette import INK, SOFT
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
 

@@ -7,18 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from peakflight.airframe import Airframe
+from peakflight.curves import sampled_curves, shown_kinds
 from peakflight.figures.canvas import (
-    FAINT,
-    INK,
-    LIMIT,
     POINTS,
-    SOFT,
     TEXT,
     WIDTH,
     add_axes,
     draw_limit,
-    even_step,
     new_figure,
     span,
     text_width,
@@ -26,24 +21,11 @@ from peakflight.figures.canvas import (
     write_limit,
     write_note,
 )
-from peakflight.limits import (
-    KINDS,
-    LARGEST,
-    ROTORS,
-    LimitKind,
-    Limits,
-    limited_values,
-    plain_unit,
-)
+from peakflight.labelling import even_step
+from peakflight.limits import LimitKind, plain_unit
+from peakflight.palette import FAINT, INK, LIMIT, SOFT
 from peakflight.result import BINDING, Plan
-from peakflight.trajectory import Trajectory
 
-ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
-"""Shown whether they are limited or not."""
-SAMPLES = 3000
-"""About how many points a curve has."""
-PIECE_SAMPLES = (9, 200)
-"""Fewest and most points to a polynomial piece."""
 PANEL = 1.05
 """Height of a panel, in."""
 GAP = 0.13
@@ -85,40 +67,6 @@ def derivatives_figure(plan: Plan) -> Figure:
         draw_borders(axes, plan.waypoint_times)
     number_legs(panels[0], plan.waypoint_times)
     return figure
-
-
-def sampled_curves(
-    trajectory: Trajectory, airframe: Airframe | None = None
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """(K, n) s, and name of limit to (K, n): what it limits, densely enough for a curve."""
-    count = int(np.clip(SAMPLES // len(trajectory), *PIECE_SAMPLES))
-    local = trajectory.segment_times[:, None] * np.linspace(0.0, 1.0, count)
-    return trajectory.breakpoints[:-1, None] + local, sampled_values(trajectory, count, airframe)
-
-
-def sampled_values(
-    trajectory: Trajectory, count: int, airframe: Airframe | None = None
-) -> dict[str, np.ndarray]:
-    """Name of limit to (K, count): what it limits, at even points of each piece.
-
-    In the unit of the limit, but tilt in degrees.
-    """
-    derivatives = [trajectory.sample(count, order) for order in (1, 2, 3, 4)]
-    values = limited_values(derivatives, airframe)
-    values["tilt"] = np.degrees(values["tilt"])
-    for name in ("body_rate", "angular_acceleration", *ROTORS):  # in free fall they are infinite
-        if name in values:
-            values[name] = np.clip(values[name], -LARGEST, LARGEST)
-    return values
-
-
-def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind]:
-    """Choose the kinds of limit that get a panel."""
-    return [
-        kind
-        for kind in KINDS
-        if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
-    ]
 
 
 def panels_height(count: int) -> float:

@@ -9,14 +9,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from peakflight.figures.canvas import (
-    FAINT,
-    INK,
     POINTS,
-    SOFT,
     TEXT,
     WIDTH,
     add_axes,
-    even_step,
     name_lines,
     new_figure,
     shortened,
@@ -24,6 +20,8 @@ from peakflight.figures.canvas import (
     write_title,
 )
 from peakflight.figures.flights import looks
+from peakflight.labelling import even_step
+from peakflight.palette import FAINT, INK, SOFT
 
 ROW = 0.23
 """Height of a course, in; less if there are many."""

@@ -8,10 +8,6 @@ from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
     COLOURS,
-    FAINT,
-    INK,
-    LIMIT,
-    SOFT,
     TEXT,
     WIDTH,
     add_axes,
@@ -24,6 +20,7 @@ from peakflight.figures.canvas import (
 )
 from peakflight.figures.course import FlownPath, draw_views, paper_height
 from peakflight.figures.rotors import STYLES
+from peakflight.palette import FAINT, INK, LIMIT, SOFT
 from peakflight.result import Plan
 
 if TYPE_CHECKING:

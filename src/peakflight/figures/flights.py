@@ -10,15 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from peakflight.figures.canvas import (
-    COLOURS,
-    POINTS,
-    TEXT,
-    WIDTH,
-    name_lines,
-    seconds,
-    text_width,
-)
+from peakflight.figures.canvas import COLOURS, POINTS, TEXT, WIDTH, name_lines, seconds, text_width
 from peakflight.methods import METHODS
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory

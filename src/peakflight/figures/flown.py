@@ -8,16 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from peakflight.figures.canvas import (
-    INK,
-    LIMIT,
-    TEXT,
-    WIDTH,
-    add_axes,
-    name_lines,
-    new_figure,
-    write_title,
-)
+from peakflight.figures.canvas import TEXT, WIDTH, add_axes, name_lines, new_figure, write_title
 from peakflight.figures.course import FlownPath, draw_views, paper_height
 from peakflight.figures.derivatives import (
     BOTTOM,
@@ -32,6 +23,7 @@ from peakflight.figures.flights import LEGEND_ROW, LEGEND_TOP, looks
 from peakflight.figures.overlaid_derivatives import ABOVE, CUT
 from peakflight.figures.paths import SIDE_WIDTH
 from peakflight.limits import KINDS, plain_unit
+from peakflight.palette import INK, LIMIT
 from peakflight.result import Plan
 
 if TYPE_CHECKING:

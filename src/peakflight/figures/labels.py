@@ -5,14 +5,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from peakflight.figures.canvas import TEXT, even_step, text_width
+from peakflight.figures.canvas import TEXT, text_width
+from peakflight.labelling import waypoint_texts
 
-SAME_PLACE = 1e-6
-"""Waypoints that are no further apart share a label, relative to the size of the course."""
-MOST_LABELS = 25
-"""With more waypoints than this, only every second, fifth, tenth, ... is numbered."""
-MOST_NUMBERS = 5
-"""A place that is passed more often lists its first numbers only."""
 CLEARANCE = 4.5
 """Room between a place and the edge of its label, pt."""
 SPACING = (3.0, 0.5)
@@ -83,7 +78,7 @@ def waypoint_labels(
     """
     boxes = list(taken)
     labels = []
-    for index, text in _texts(waypoints).items():
+    for index, text in waypoint_texts(waypoints).items():
         half = 0.5 * np.array([text_width(text), TEXT])
         centres = np.concatenate(
             [
@@ -106,36 +101,6 @@ def waypoint_labels(
         place = places[index] if misleads[best] else None
         labels.append(Label(text, boxes[-1], bool(on_path[best]), place))
     return labels
-
-
-def _texts(waypoints: np.ndarray) -> dict[int, str]:
-    """Say what to write at which waypoint, the start and the end first."""
-    last = len(waypoints) - 1
-    grid = SAME_PLACE * max(float(np.ptp(waypoints, axis=0).max()), 1e-300)
-    cells = np.round((waypoints - waypoints[0]) / grid)
-    _, group = np.unique(cells, axis=0, return_inverse=True)
-    members: dict[int, list[int]] = {}
-    for index, key in enumerate(group.ravel()):
-        members.setdefault(int(key), []).append(index)
-    step = even_step(len(members), MOST_LABELS)
-    ends = [numbers for numbers in members.values() if numbers[0] == 0 or numbers[-1] == last]
-    inner = [
-        numbers
-        for numbers in members.values()
-        if numbers not in ends and any(number % step == 0 for number in numbers)
-    ]
-    return {numbers[0]: _list(numbers, last) for numbers in ends + inner}
-
-
-def _list(numbers: Sequence[int], last: int) -> str:
-    names = {0: "0 start", last: f"{last} end"}
-    shown = [number for number in numbers[:MOST_NUMBERS] if number != last]
-    words = [names.get(number, str(number)) for number in shown]
-    if len(numbers) > MOST_NUMBERS:
-        words.append("…")
-    if last in numbers:
-        words.append(names[last])
-    return ", ".join(words)
 
 
 def _misleads(centres: np.ndarray, half: np.ndarray, places: np.ndarray, index: int) -> np.ndarray:

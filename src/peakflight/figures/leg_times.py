@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from peakflight.figures.canvas import INK, TEXT, WIDTH, add_axes, even_step, new_figure, write_title
+from peakflight.figures.canvas import TEXT, WIDTH, add_axes, new_figure, write_title
 from peakflight.figures.flights import LEGEND_TOP, Flight, legend_height, write_legend
+from peakflight.labelling import even_step
+from peakflight.palette import INK
 
 LEFT, RIGHT, BOTTOM, ABOVE = 0.75, 0.15, 0.45, 0.14
 """Margins, in."""

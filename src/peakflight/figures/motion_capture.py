@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from peakflight.figures.canvas import INK, TEXT, name_lines, new_figure, write_title
+from peakflight.figures.canvas import TEXT, name_lines, new_figure, write_title
 from peakflight.figures.course import FlownPath, draw_views, paper_height
 from peakflight.figures.derivatives import (
     HEADROOM,
@@ -20,6 +20,7 @@ from peakflight.figures.derivatives import (
 from peakflight.figures.flights import LEGEND_ROW, LEGEND_TOP
 from peakflight.figures.paths import SIDE_WIDTH
 from peakflight.limits import KINDS
+from peakflight.palette import INK
 from peakflight.result import Plan
 
 if TYPE_CHECKING:

@@ -5,16 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from peakflight.figures.canvas import INK, TEXT, new_figure, write_title
-from peakflight.figures.derivatives import (
-    add_panels,
-    panels_height,
-    sampled_curves,
-    scale_panel,
-    shown_kinds,
-)
+from peakflight.curves import sampled_curves, shown_kinds
+from peakflight.figures.canvas import TEXT, new_figure, write_title
+from peakflight.figures.derivatives import add_panels, panels_height, scale_panel
 from peakflight.figures.flights import LEGEND_TOP, Flight, legend_height, write_legend
 from peakflight.limits import Limits, plain_unit
+from peakflight.palette import INK
 
 ABOVE = 0.14
 """Between the legend and the first panel, in."""

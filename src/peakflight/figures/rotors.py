@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from peakflight.curves import inner_times
 from peakflight.errors import InvalidProblem
 from peakflight.figures.canvas import (
     COLOURS,
-    INK,
     WIDTH,
     draw_limit,
     name_lines,
@@ -26,10 +26,10 @@ from peakflight.figures.derivatives import (
     draw_borders,
     number_legs,
     panels_height,
-    sampled_curves,
     scale_panel,
 )
 from peakflight.limits import LimitKind
+from peakflight.palette import INK
 from peakflight.result import Plan
 
 THRUST = LimitKind("rotor_thrust", "N", 4, "rotor thrust")
@@ -58,7 +58,7 @@ def rotors_figure(plan: Plan) -> Figure:
         raise InvalidProblem("the plan has no vehicle, so nothing is known of its rotors")
     from peakflight.flatness import planned_states
 
-    times = sampled_curves(plan.trajectory)[0].ravel()
+    times = inner_times(plan.trajectory).ravel()
     states = planned_states(plan, times)
     least, most = map(_rounded, vehicle.rotor_thrust)
     across, about = map(_rounded, vehicle.body_rate) if vehicle.body_rate else (None, None)

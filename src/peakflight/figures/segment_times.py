@@ -13,19 +13,17 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 
 from peakflight.figures.canvas import (
     COLOURS,
-    FAINT,
-    INK,
-    LIMIT,
     POINTS,
     TEXT,
     WIDTH,
     add_axes,
-    even_step,
     new_figure,
     seconds,
     write_headline,
     write_note,
 )
+from peakflight.labelling import even_step
+from peakflight.palette import FAINT, INK, LIMIT
 from peakflight.result import BINDING, Plan
 from peakflight.yaw import ALL_LABELS
 

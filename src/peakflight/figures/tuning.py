@@ -5,9 +5,6 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
-    FAINT,
-    INK,
-    LIMIT,
     TEXT,
     WIDTH,
     add_axes,
@@ -16,6 +13,7 @@ from peakflight.figures.canvas import (
     write_note,
     write_title,
 )
+from peakflight.palette import FAINT, INK, LIMIT
 
 HEIGHT = 3.1
 LEFT, RIGHT, BOTTOM, TOP = 0.66, 0.3, 0.46, 0.62

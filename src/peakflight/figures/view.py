@@ -14,8 +14,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from peakflight.figures.canvas import FAINT, POWERS, SOFT, TEXT, span, text_width, write
+from peakflight.figures.canvas import POWERS, TEXT, span, text_width, write
 from peakflight.figures.labels import Box
+from peakflight.palette import FAINT, SOFT
 from peakflight.problem import AXES
 
 AZIMUTH = np.radians(-60.0)

@@ -5,8 +5,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from peakflight.figures.canvas import (
-    INK,
-    SOFT,
     TEXT,
     WIDTH,
     add_axes,
@@ -28,6 +26,7 @@ from peakflight.figures.derivatives import (
     number_legs,
 )
 from peakflight.limits import plain_unit
+from peakflight.palette import INK, SOFT
 from peakflight.result import Plan
 from peakflight.twist import turning_about_z
 

@@ -7,6 +7,7 @@ from typing import Any
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.files import PathLike, parse_json, read_text
 from peakflight.formats.courses import json_course, yaml_course
+from peakflight.limits import plain_unit
 from peakflight.vehicle import Vehicle
 
 FIGURES = {
@@ -45,6 +46,18 @@ def read_vehicle(path: PathLike) -> Vehicle:
         return Vehicle.from_dict({"name": path.stem, **values})
     except InvalidProblem as error:
         raise InvalidFile(f"{path}: {error}") from None
+
+
+def shown_figure(vehicle: Vehicle, name: str) -> str:
+    """One of `FIGURES` of a vehicle with its unit, as it is shown to people."""
+    value = getattr(vehicle, name)
+    return "unknown" if value is None else f"{_shown(value)} {plain_unit(FIGURES[name][0])}".strip()
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ("; " if isinstance(value[0], tuple) else ", ").join(map(_shown, value))
+    return f"{value:.4g}"
 
 
 def as_yaml(vehicle: Vehicle) -> str:
