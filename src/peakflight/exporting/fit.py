@@ -6,15 +6,15 @@ and the smoothest is met again by the effort that makes it as long.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from peakflight.certificate import certify
 from peakflight.errors import InvalidProblem
-from peakflight.exporting.merging import merged
 from peakflight.formats.flight_files import Encoded, FlightFormat, Reading
 from peakflight.limits import LABELS, Limits
+from peakflight.methods.merging import merged
 from peakflight.planner import plan as solve
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
@@ -32,8 +32,6 @@ SLOWEST = 2.0
 """Factor of the time beyond which rounding is not fought by flying slower."""
 TOLERANCE = 1e-5
 """Of planning again: finer than usual, since it makes up for pieces that are missing."""
-AT_ONCE = 4
-"""Pieces that are merged before it is planned again: the others then move to where they help."""
 AS_LONG = 1e-3
 """Part of its duration by which a plan made again may be shorter, to count as the same."""
 EFFORT_ORDERS = {"acceleration": 2, "jerk": 3, "snap": 4}
@@ -224,41 +222,29 @@ def _fewer(plan: Plan, room: int | None, chosen: FlightFormat) -> Iterator[Plan]
 def _again(plan: Plan, most_pieces: int, *, carefully: bool) -> Plan:
     """The plan by method joint with at most so many pieces, and no shorter than it was.
 
-    Carefully: also from the plan itself, with a few pieces less at a time, which may be faster.
+    Carefully: with the pieces where they help most.
     """
-    fresh = solve(plan.problem, method=METHOD, max_pieces=most_pieces, tolerance=TOLERANCE)
-    fastest, by_steps = fresh, plan
-    if carefully:
-        for count in reversed(range(most_pieces, len(plan.trajectory), AT_ONCE)):
-            by_steps = _from(by_steps, count, effort=0.0)
-        fastest = min(fresh, by_steps, key=lambda one: (not one.feasible, one.duration))
+    options: dict[str, Any] = {"max_pieces": most_pieces, "tolerance": TOLERANCE}
+    if not carefully:
+        options["exchanges"] = 0
+    fastest = solve(plan.problem, method=METHOD, **options)
     enough = (1.0 - AS_LONG) * plan.duration
     if not fastest.feasible or fastest.duration >= enough:
         return fastest
+    fewer, pieces = merged(plan.trajectory, np.array(plan.pieces), most_pieces)
+    start = replace(plan, trajectory=fewer, pieces=tuple(pieces.tolist()))
     natural = plan.duration / _integral(plan, EFFORT_ORDERS.get(str(plan.problem.minimize), 3))
     low, high = np.log(natural / EFFORTS), np.log(natural)
     best = fastest
     for _ in range(EFFORT_ROUNDS):
         middle = 0.5 * (low + high)
-        found = _from(plan, most_pieces, effort=float(np.exp(middle)))
+        effort = float(np.exp(middle))
+        found = solve(plan.problem, method=METHOD, initial=start, effort=effort, **options)
         if found.feasible and found.duration >= enough:
             best, high = found, middle
         else:
             low = middle
     return best
-
-
-def _from(plan: Plan, most_pieces: int, *, effort: float) -> Plan:
-    """Planned again from a plan whose pieces are merged until there are few enough."""
-    start = merged(plan, most_pieces)
-    return solve(
-        plan.problem,
-        method=METHOD,
-        initial=start,
-        max_pieces=most_pieces,
-        effort=effort,
-        tolerance=TOLERANCE,
-    )
 
 
 def _integral(plan: Plan, order: int) -> float:

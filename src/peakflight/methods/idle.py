@@ -44,4 +44,8 @@ def parts_for(idle: np.ndarray, allowance: float, most: int | None) -> np.ndarra
     for _ in range(60):  # bisection: the sum grows with the scale, in steps
         middle = 0.5 * (low + high)
         low, high = (middle, high) if parts(middle).sum() <= most else (low, middle)
-    return parts(low)
+    found = parts(low)  # pieces alike grow all at once: what is left goes to the nearest
+    nearest = np.argsort(found - low * roots, kind="stable")
+    nearest = nearest[(found < MOST_PARTS)[nearest] & (roots > 0.0)[nearest]]
+    found[nearest[: most - found.sum()]] += 1
+    return found

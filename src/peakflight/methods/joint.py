@@ -27,6 +27,7 @@ from peakflight.methods import (
     require_whole,
 )
 from peakflight.methods.classes import complete, without_class
+from peakflight.methods.exchange import exchanged
 from peakflight.methods.idle import idle_times, parts_for
 from peakflight.methods.start import Start, guess, start_of
 from peakflight.problem import Problem
@@ -65,6 +66,12 @@ EASE, EASE_OF_MANY = 1.0, 0.0
 """Of the guess, for whole legs and where legs are cut: which of them ends better was measured."""
 GAIN_OF_CUT = 1e-3
 """Relative gain of a cut below which legs are not cut again."""
+TRIAL = 1e-4
+"""Tolerance of a solution that only says what an exchange of pieces is worth, unless a coarser one
+is asked for."""
+MOST_EXCHANGED = 64
+"""Pieces in all up to which they are exchanged one by one: of more, one is worth too little for the
+time that it takes to find out."""
 FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
 RETRIES = 4
@@ -83,6 +90,9 @@ class Settings:
     from."""
     max_pieces: int | None = None
     """Most polynomials in all; None for no limit of its own (a Crazyflie holds 31)."""
+    exchanges: int = 10
+    """Most rounds in which, where max_pieces is up to 64 and too few, one piece is cut and another
+    merged, as long as it pays; 0 leaves them where idle time puts them."""
     effort: float = 0.0
     """Weight of the integral of what the problem minimizes beside the total time, in s^6/m^2 for
     jerk and s^8/m^2 for snap: from the fastest, 0, to the smoothest."""
@@ -108,6 +118,7 @@ class Settings:
             require_whole("pieces", self.pieces, 1, 1000)
         if self.max_pieces is not None:
             require_whole("max_pieces", self.max_pieces, 1, 10**7)
+        require_whole("exchanges", self.exchanges, 0, 1000)
         require("effort", self.effort, 0.0, 1e9)
         named = isinstance(self.initial, str) and self.initial in STARTS
         if not (named or isinstance(self.initial, Plan)):
@@ -237,6 +248,8 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         runs.append(_from(task, _cut(last, parts), GOING_ON))
         if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
+    if cuts and _is_short(task, runs[-1]):
+        runs.append(_exchanged(task, runs[-1]))
     if runs[-1].ended and not runs[-1].solved:  # nothing to cut: only a rough run so far
         runs.append(_from(task, runs[-1], GOING_ON))
     for _ in range(RETRIES):
@@ -274,6 +287,37 @@ def _parts(task: _Task, run: _Run) -> np.ndarray:
     if idle.sum() < ENOUGH * allowance:
         return np.ones(len(idle), dtype=np.int64)
     return parts_for(idle, allowance, settings.max_pieces)
+
+
+def _is_short(task: _Task, run: _Run) -> bool:
+    """Whether there are fewer pieces than would pay, so that it matters where they are."""
+    settings, problem = task.settings, task.problem
+    most = settings.max_pieces
+    if settings.pieces != "auto" or most is None or task.effort is not None:
+        return False
+    if not (len(run.pieces) < most <= MOST_EXCHANGED and problem.is_at_rest):
+        return False
+    idle = idle_times(run.trajectory, problem.limits).sum()
+    return bool(idle >= ENOUGH * settings.idle_tolerance * run.trajectory.duration)
+
+
+def _exchanged(task: _Task, run: _Run) -> _Run:
+    """A run with its pieces where they help most."""
+    spent = 0
+    settings = task.settings
+
+    def solve(trajectory: Trajectory, pieces: np.ndarray) -> _Run | None:
+        nonlocal spent
+        if task.is_late:
+            return None
+        start = start_of(trajectory, pieces, task.problem)
+        tried = _run(task, start, GOING_ON, max(settings.tolerance, TRIAL))
+        spent += tried.iterations
+        return tried
+
+    assert settings.max_pieces is not None
+    found = exchanged(run, task.problem.limits, settings.max_pieces, settings.exchanges, solve)
+    return replace(found, iterations=spent)
 
 
 def _run(
