@@ -52,8 +52,9 @@ CHUNK = 4
 """Iterations between looks at the clock, if there is a time limit."""
 TIGHTENINGS = 8
 """Rounds of lowering limits, where a motion that is fixed rules out the stretch."""
-NARROWINGS, NARROW = 4, 2e-3
-"""Rounds of the same, where peaks between samples would cost more than this part of the time."""
+NARROWINGS, NARROW = 4, 20.0
+"""Rounds of the same, where peaks between samples would cost more of the time than so many times
+the tolerance."""
 BEYOND = 1e-5
 """Part of a limit by which it is lowered further then, where it is about rotors."""
 HOPELESS = 0.2
@@ -417,7 +418,8 @@ def _finished(task: _Task, runs: list[_Run]) -> Outcome:
                 pieces=tuple(run.pieces.tolist()),
                 memory=last.dual,
             )
-        missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
+        least = 1.0 + NARROW * task.settings.tolerance
+        missed = found is None or found.duration > least * run.trajectory.duration
         if best is not None and (_eases(task.problem) or task.is_late or not missed):
             break
     if best is not None:
@@ -439,6 +441,7 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
     stretch that is worth having; then limits are lowered until the motion keeps them as it is.
     """
     limits, eases = task.problem.limits, _eases(task.problem)
+    least = 1.0 + NARROW * task.settings.tolerance
     lowered = limits.as_array()
     best, answer = None, run
     for _ in range(NARROWINGS if eases else TIGHTENINGS):
@@ -448,7 +451,7 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
             found = None if stretched is None else stretched[0]
         if found is not None and (best is None or found.duration < best.duration):
             best, answer = found, run
-        missed = found is None or found.duration > (1.0 + NARROW) * run.trajectory.duration
+        missed = found is None or found.duration > least * run.trajectory.duration
         if task.is_late or not missed:
             break
         excess = _excess(task, run.trajectory)
@@ -456,7 +459,7 @@ def _stretched(task: _Task, run: _Run) -> tuple[Trajectory | None, _Run]:
             excess = np.where(excess > 0.0, 2.0 * excess + BEYOND, 0.0)
         lowered = _lowered(lowered, np.fmin(excess, HOPELESS))
         run = _from(task, run, GOING_ON if eases else WARM, lowered)
-    if best is not None and best.duration > (1.0 + NARROW) * answer.trajectory.duration:
+    if best is not None and best.duration > least * answer.trajectory.duration:
         answer = replace(answer, solved=False)
     return best, answer
 
