@@ -10,7 +10,7 @@ import click
 from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
-from peakflight.errors import InvalidFile
+from peakflight.errors import InvalidFile, quoted
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.formats.flight_files import OTHER_NAMES, find_format
 from peakflight.result import Plan
@@ -27,6 +27,23 @@ class FormatName(click.Choice):  # type: ignore[type-arg]
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Its own name."""
         return str(super().convert(OTHER_NAMES.get(value, value), param, ctx))
+
+
+class Lift(click.ParamType):  # type: ignore[type-arg]
+    """A number of metres, or auto."""
+
+    name = "lift"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float | str:
+        """The number, or the word."""
+        if not isinstance(value, str) or value == "auto":
+            return value
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"{quoted(value)} is neither auto nor a number of m", param, ctx)
 
 
 @click.command(short_help="Write the file that a vehicle flies, certified as it is read.")
@@ -52,6 +69,12 @@ class FormatName(click.Choice):  # type: ignore[type-arg]
     is_flag=True,
     help="Neither plan again with fewer pieces nor fly slower, whatever the format does to it.",
 )
+@click.option(
+    "--lift",
+    type=Lift(),
+    metavar="METRES|auto",
+    help="Move the plan up first; auto puts its lowest point 0.5 m above where the vehicle starts.",
+)
 @click.option("--list", "show_list", is_flag=True, help="List the formats.")
 @common_options
 def export(
@@ -59,6 +82,7 @@ def export(
     name: str | None,
     output: Path | None,
     no_refit: bool,
+    lift: float | str | None,
     show_list: bool,
     as_json: bool,
 ) -> int:
@@ -73,7 +97,7 @@ def export(
     \b
     Example:
       peakflight export race/plan.json --to crazyswarm
-      peakflight export race/plan.json --to px4 -o fly.py
+      peakflight export race/plan.json --to px4 --lift auto -o fly.py
       peakflight export one/plan.json two/plan.json --to skyc -o show.skyc
     """  # noqa: D301
     if show_list:
@@ -99,6 +123,7 @@ def export(
             to=name,
             path=path,
             refit=not no_refit,
+            lift=0.0 if lift is None else lift,
             names=_names(plans),
         )
     if as_json:

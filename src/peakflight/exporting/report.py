@@ -87,6 +87,8 @@ class ExportReport:
     """Part of a limit by which the file may exceed it, for rounding."""
     flights: tuple[ExportedFlight, ...]
     """One for each plan."""
+    lift: float = 0.0
+    """m, by which the plans were moved up first."""
     notes: tuple[str, ...] = ()
     """For whoever flies it, one line each."""
 
@@ -122,6 +124,7 @@ class ExportReport:
             **values,
             "feasible": self.feasible,
             "problems": list(self.problems),
+            "lift": self.lift,
             "flights": [flight.to_dict() for flight in self.flights],
             "notes": list(self.notes),
         }

@@ -3,6 +3,7 @@
 import numpy as np
 
 from peakflight.errors import InvalidProblem
+from peakflight.exporting.lifting import lowest
 from peakflight.formats.flight_files import FlightFormat
 from peakflight.result import Plan
 from peakflight.trajectory import Trajectory
@@ -38,24 +39,23 @@ def check_whole_flight(name: str, chosen: FlightFormat, which: str, plan: Plan) 
                 f"{which} {end} at {speed:.3g} m/s and {acceleration:.3g} m/s^2; in format {name} "
                 "the vehicle hovers before and after; the plan must begin and end at rest"
             )
-    if chosen.from_ground:
-        height, time = _lowest(flight)
-        if not height >= -ON_GROUND:
-            raise InvalidProblem(
-                f"{which} goes down to z = {height:.3g} m at {time:.3g} s; in format {name} z is "
-                "above where the vehicle starts, and must not be below 0"
-            )
+    check_above_ground(name, chosen, which, flight)
 
 
-def _lowest(flight: Trajectory) -> tuple[float, float]:
-    """Least z, m, and when it is reached, s: at an end of a piece or where z stands still."""
-    found, powers = [], np.arange(flight.degree + 1)
-    for index, h in enumerate(flight.segment_times.tolist()):
-        z = np.polynomial.Polynomial(flight.coefficients[index, :, 2] * h**powers)
-        slope = z.deriv().trim()
-        roots = slope.roots() if slope.degree() > 0 else np.empty(0)
-        parts = np.concatenate(([0.0, 1.0], np.clip(np.real(roots), 0.0, 1.0)))
-        heights = z(parts)
-        lowest = int(heights.argmin())
-        found.append((float(heights[lowest]), float(flight.breakpoints[index] + parts[lowest] * h)))
-    return min(found)
+def check_above_ground(name: str, chosen: FlightFormat, which: str, flight: Trajectory) -> None:
+    """Refuse a flight that goes below z = 0, where that is below where the vehicle starts.
+
+    Raises
+    ------
+    InvalidProblem
+        If it does.
+    """
+    if not chosen.from_ground:
+        return
+    height, time = lowest(flight)
+    if not height >= -ON_GROUND:
+        raise InvalidProblem(
+            f"{which} goes down to z = {height:.3g} m at {time:.3g} s; in format {name} z is above "
+            "where the vehicle starts, and must not be below 0; move it up, with --lift auto or by "
+            "as many m as you say (peakflight export; in Python lift=...)"
+        )

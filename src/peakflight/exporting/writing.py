@@ -6,6 +6,7 @@ from pathlib import Path
 from peakflight.certificate import certify_plan
 from peakflight.errors import InvalidFile, InvalidProblem
 from peakflight.exporting.fit import Held, fit
+from peakflight.exporting.lifting import AUTO, lifted, lowest
 from peakflight.exporting.report import (
     ExportedFlight,
     ExportReport,
@@ -13,7 +14,7 @@ from peakflight.exporting.report import (
     jumps,
     yaw_difference,
 )
-from peakflight.exporting.whole_flight import check_whole_flight
+from peakflight.exporting.whole_flight import ON_GROUND, check_above_ground, check_whole_flight
 from peakflight.files import PathLike, write_atomically
 from peakflight.formats.flight_files import FlightFormat, Reading, find_format
 from peakflight.formats.flight_files.flight_format import POLYNOMIAL
@@ -26,6 +27,7 @@ def export(
     to: str,
     path: PathLike | None = None,
     refit: bool = True,
+    lift: float | str = 0.0,
     names: Sequence[str] | None = None,
 ) -> ExportReport:
     """Write the flight file of a plan, or of several, and certify the numbers that are in it.
@@ -48,6 +50,10 @@ def export(
         Whether the flight may be planned with fewer pieces or flown slower. If not, one that does
         not fit is refused, and one that rounding takes beyond a limit is written and reported as
         not feasible.
+    lift
+        By how many m plans are moved up first, for courses that are not above a floor; or "auto",
+        by as much as puts their lowest point 0.5 m above z = 0. Several plans are moved alike.
+        Moved, they are proven again, and the report is about them.
     names
         Of the drones, one for each plan; by default drone_1, drone_2, ...
 
@@ -56,7 +62,8 @@ def export(
     InvalidProblem
         If the format is unknown or cannot hold the flight, a plan is not proven to keep its
         limits, begins or ends in motion or goes underground where the file flies from the ground
-        and back, or a vehicle is missing; the message says which.
+        and back, the lift is neither "auto" nor from 0 on, or a vehicle is missing; the message
+        says which.
     InvalidFile
         If the file cannot be written.
     MissingExtra
@@ -65,11 +72,19 @@ def export(
     name, chosen = find_format(to)
     plans = (plan,) if isinstance(plan, Plan) else tuple(plan)
     names = _names(names, len(plans))
+    plans, up = lifted(plans, lift)
     _check(name, chosen, plans)
     path = Path(chosen.filename if path is None else path)
     if path.is_dir():
         raise InvalidFile(f"{path}: is a folder; name a file in it")
     written = fit(plans, names, chosen, refit=refit)
+    if lift == AUTO:  # planned again, a flight may dip lower than its plan
+        higher, more = lifted(written.plans, lift)
+        if more > ON_GROUND:
+            written = fit(higher, names, chosen, refit=refit)
+            plans, up = lifted(plans, more)[0], up + more
+    for index, reading in enumerate(written.readings):
+        check_above_ground(name, chosen, f"{_which(index, plans)} as written", reading.trajectory)
     flights = tuple(
         _flight(*item, chosen)
         for item in zip(names, plans, written.plans, written.readings, written.held, strict=True)
@@ -81,7 +96,13 @@ def export(
         size=len(written.encoded.data),
         tolerance=chosen.tolerance,
         flights=flights,
-        notes=(*_distance_notes(flights), *_cost_notes(flights), *written.encoded.notes),
+        lift=up,
+        notes=(
+            *_lift_notes(up, flights),
+            *_distance_notes(flights),
+            *_cost_notes(flights),
+            *written.encoded.notes,
+        ),
     )
 
 
@@ -103,7 +124,7 @@ def _check(name: str, chosen: FlightFormat, plans: Sequence[Plan]) -> None:
     if len(plans) > 1 and not chosen.several:
         raise InvalidProblem(f"format {name} holds one drone; {len(plans)} plans are given")
     for index, plan in enumerate(plans):
-        which = f"plan {index + 1}" if len(plans) > 1 else "the plan"
+        which = _which(index, plans)
         if chosen.needs_vehicle and plan.vehicle is None:
             raise InvalidProblem(
                 f"format {name} needs a vehicle, and {which} has none; plan with vehicle=... "
@@ -113,6 +134,10 @@ def _check(name: str, chosen: FlightFormat, plans: Sequence[Plan]) -> None:
         proof = certify_plan(plan)
         if not proof.feasible:
             raise InvalidProblem(f"{which} is not proven to keep its limits: {proof.problems[0]}")
+
+
+def _which(index: int, plans: Sequence[Plan]) -> str:
+    return f"plan {index + 1}" if len(plans) > 1 else "the plan"
 
 
 def _flight(
@@ -136,6 +161,17 @@ def _flight(
         problems=kept.problems,
         trajectory=flown,
     )
+
+
+def _lift_notes(up: float, flights: Sequence[ExportedFlight]) -> list[str]:
+    """How far up plans were moved, and where that leaves them."""
+    if up == 0.0:
+        return []
+    height, time = min(lowest(flight.trajectory) for flight in flights)
+    return [
+        f"moved up by {up:.3f} m: the lowest point, at {time:.3f} s, is {height:.3f} m above z = 0;"
+        " differences are to the plan there"
+    ]
 
 
 def _distance_notes(flights: Sequence[ExportedFlight]) -> list[str]:

@@ -88,9 +88,7 @@ def _best_cut(
     return _best(found)
 
 
-def _best_merge(
-    run: Run, solve: Callable[[Trajectory, np.ndarray], Run | None]
-) -> Run | None:
+def _best_merge(run: Run, solve: Callable[[Trajectory, np.ndarray], Run | None]) -> Run | None:
     """The best solution with one piece less."""
     change = changes(run.trajectory, run.pieces)
     firsts = np.argsort(change, kind="stable")[: min(TRIES, int(np.isfinite(change).sum()))]

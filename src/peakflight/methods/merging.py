@@ -25,9 +25,7 @@ def merged(
     return trajectory, pieces
 
 
-def merge(
-    trajectory: Trajectory, pieces: np.ndarray, first: int
-) -> tuple[Trajectory, np.ndarray]:
+def merge(trajectory: Trajectory, pieces: np.ndarray, first: int) -> tuple[Trajectory, np.ndarray]:
     """A piece and the next one, of the same leg, as one."""
     pair = _pairs(trajectory)
     coefficients = np.concatenate(
