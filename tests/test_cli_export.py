@@ -135,11 +135,29 @@ def test_bad_input_is_one_line(run: Run, folder: Path) -> None:
     refused(run("export", "one/plan.json", "--to", "px4", "-o", "two"), "two: is a folder")
     refused(run("export", "one/plan.json", "two/plan.json", "--to", "px4"), "holds one drone")
     refused(run("export", "one/plan.json", "--to", "px4", "-o", "no/f.py"), "cannot be written")
+    lift = ("export", "one/plan.json", "--to", "px4", "--lift")
+    refused(run(*lift, "up"), "'up' is neither auto nor a number of m")
+    refused(run(*lift, "-1"), "lift is -1 m; it must be auto or a number of m from 0 on")
     values = json.loads(Path("one/plan.json").read_text())
     values["problem"]["vehicle"] = None
     Path("bare.json").write_text(json.dumps(values))
     refused(run("export", "bare.json", "--to", "agilicious"), "needs a vehicle")
     assert sorted(path.name for path in folder.iterdir()) == ["bare.json", "lap.csv", "one", "two"]
+
+
+def test_lift_moves_the_plan_up_and_says_so(run: Run) -> None:
+    for lift, by in (("auto", 0.0), ("1.5", 1.5)):
+        result = run("export", "one/plan.json", "--to", "px4", "--lift", lift, "--json")
+        assert result.exit_code == 0
+        said = json.loads(result.stdout)
+        assert said["lift"] == by
+        assert any(note.startswith("moved up by 1.500 m") for note in said["notes"]) == (by > 0.0)
+    Path("down.csv").write_text("x,y,z\n0,0,0.2\n0.8,0.4,-0.6\n1.2,1.0,0.2\n")
+    assert run("plan", "down.csv", "--vehicle", "crazyflie-2.1", "-o", "down").exit_code == 0
+    refused(run("export", "down/plan.json", "--to", "px4"), "--lift auto")
+    result = run("export", "down/plan.json", "--to", "px4", "--lift", "auto")
+    assert result.exit_code == 0
+    assert "is 0.500 m above z = 0" in " ".join(result.stdout.split())
 
 
 def test_plan_writes_what_it_is_asked_for(run: Run, folder: Path) -> None:

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 import peakflight as pf
 from peakflight.exporting.fit import held, stretched
-from peakflight.exporting.merging import merged
 from peakflight.exporting.writing import _cost_notes
 from peakflight.formats import FLIGHT_FORMATS, find_format, read_course
 from peakflight.formats.flight_files.flight_format import Reading, through_samples
 from peakflight.formats.flight_files.rounded import control_points, motion, rounded
 from peakflight.formats.flight_files.skyc import keeps
+from peakflight.methods.merging import merged
 
 COURSES = Path(__file__).parent.parent / "examples" / "courses"
 PUBLIC = sorted(path for path in COURSES.iterdir() if path.suffix != ".md")
@@ -95,7 +95,7 @@ def test_every_format_is_within_its_precision_and_tolerance(path: Path, tmp_path
         pytest.param(
             "uzh_19wp.json",
             marks=pytest.mark.xfail(
-                reason="under the default limits some 60 pieces pay: 31 cost 0.8 to 1.4 %",
+                reason="under the default limits some 60 pieces pay: 31 cost 0.6 to 1.1 %",
                 strict=True,
             ),
         ),
@@ -163,10 +163,10 @@ def test_refit_says_what_it_costs(long_plan: pf.Plan, tmp_path: Path) -> None:
     assert flight.refitted
     assert flight.pieces == 31
     assert flight.plan_pieces == len(long_plan.trajectory)
-    assert 0.0 < flight.cost <= MOST_TIME_LOST
+    assert -0.1 <= flight.cost <= MOST_TIME_LOST  # planned to a finer tolerance than the plan was
     assert flight.rounding.position < 1e-5 < flight.difference.position
     count = len(long_plan.trajectory)
-    assert report.notes[0].startswith(f"planned again with 31 pieces in place of {count}: 0.")
+    assert report.notes[0].startswith(f"planned again with 31 pieces in place of {count}: ")
     for point in long_plan.problem.waypoints:
         times = flight.trajectory.breakpoints
         assert np.linalg.norm(flight.trajectory(times) - point, axis=1).min() < 1e-5
@@ -348,10 +348,56 @@ def test_a_script_that_would_go_underground_is_refused(plan: pf.Plan, tmp_path: 
     lowest = float(plan.trajectory.sample(2000)[..., 2].min())
     on_ground, under = (translated(plan, [0.0, 0.0, h - lowest]) for h in (0.0, -0.25))
     for name in HOVERING[:-1]:
-        words = r"the plan goes down to z = -0\.25 m at .* z is above where the vehicle starts"
+        words = r"down to z = -0\.25 m at .* z is above where the vehicle starts.* with --lift auto"
         refused(words, under, tmp_path / "f", to=name)
     for made, name in ((under, "skyc"), (on_ground, "px4")):
         assert pf.export(made, to=name, path=tmp_path / name).feasible
+
+
+def test_a_plan_is_lifted_from_the_ground(plan: pf.Plan, tmp_path: Path) -> None:
+    """As `editing.move` moves it, by so much, or to the height at which scripts hover."""
+    lowest = float(plan.trajectory.sample(2000)[..., 2].min())
+    under = translated(plan, [0.0, 0.0, -0.25 - lowest])
+    for lift, by in ((0.4, 0.4), ("auto", 0.75), (2, 2.0)):
+        report = pf.export(under, to="px4", path=tmp_path / "f", lift=lift)
+        flown = report.flights[0].trajectory
+        assert report.feasible
+        assert report.lift == report.to_dict()["lift"] == pytest.approx(by, abs=1e-5)
+        assert flown.sample(20)[..., 2].min() == pytest.approx(by - 0.25, abs=1e-4)
+        assert report.difference.position < 1e-3  # to the plan up there
+        assert re.match(rf"moved up by {by:.3f} m: the lowest point, at [\d.]+ s", report.notes[0])
+    high = translated(plan, [0.0, 0.0, 0.7 - lowest])
+    report = pf.export(high, to="px4", path=tmp_path / "f", lift="auto")
+    assert (report.lift, report.notes) == (0.0, ())
+    refused(r"the plan goes down to z = -0\.15 m", under, tmp_path / "g", to="px4", lift=0.1)
+    for lift in ("high", -1.0, float("nan"), True, None):
+        words = rf"lift is .*{str(lift).rstrip('.0')}.*it must be auto or a number of m from 0 on"
+        refused(words, under, tmp_path / "g", to="px4", lift=lift)
+
+
+def test_drones_are_lifted_together(plan: pf.Plan, tmp_path: Path) -> None:
+    lowest = float(plan.trajectory.sample(2000)[..., 2].min())
+    drones = [translated(plan, [x, 0.0, z - lowest]) for x, z in ((0.0, -1.0), (3.0, 0.5))]
+    report = pf.export(drones, to="crazyswarm2", path=tmp_path / "f", lift="auto")
+    assert report.lift == pytest.approx(1.5, abs=1e-5)
+    heights = [flight.trajectory.sample(200)[..., 2].min() for flight in report.flights]
+    np.testing.assert_allclose(heights, [0.5, 2.0], atol=1e-3)
+
+
+def test_a_flight_planned_again_is_held_above_the_ground_too(tmp_path: Path) -> None:
+    """With fewer pieces it leaves the plan between waypoints, downwards as well."""
+    made = pf.plan(course("uzh_19wp.json"), vehicle="crazyflie-2.1")
+    report = pf.export(made, to="cflib", path=tmp_path / "f", lift="auto")
+    flown = report.flights[0]
+    assert flown.refitted
+    assert flown.trajectory.sample(500)[..., 2].min() == pytest.approx(0.5, abs=2e-3)
+    lowest = float(made.trajectory.sample(2000)[..., 2].min())
+    dip = (report.lift - 0.5) + lowest  # by how much lower than the plan the flight goes
+    assert dip > 0.01
+    on_ground = 0.5 * dip - lowest  # the plan is above it, and the flight is not
+    words = r"the plan as written goes down to z = -0\.\d+ m"
+    refused(words, made, tmp_path / "g", to="cflib", lift=on_ground)
+    assert pf.export(made, to="crazyswarm", path=tmp_path / "c.csv", lift=on_ground).feasible
 
 
 def test_what_is_too_far_out_is_refused(tmp_path: Path) -> None:
@@ -435,18 +481,17 @@ def test_rounded_curves_are_exact_on_whole_numbers() -> None:
 
 
 def test_merged_pieces_keep_waypoints_and_joints(long_plan: pf.Plan) -> None:
-    fewer = merged(long_plan, 20)
-    assert len(fewer.trajectory) == sum(fewer.pieces) == 20
+    motion, counts = long_plan.trajectory, np.array(long_plan.pieces)
+    fewer, left = merged(motion, counts, 20)
+    assert len(fewer) == left.sum() == 20
     assert fewer.duration == pytest.approx(long_plan.duration)
-    places = fewer.trajectory(fewer.waypoint_times)
-    np.testing.assert_allclose(places, long_plan.problem.waypoints, atol=1e-9)
-    for t in fewer.trajectory.breakpoints[1:-1]:
+    passed = fewer.breakpoints[np.concatenate(([0], np.cumsum(left)))]
+    np.testing.assert_allclose(fewer(passed), long_plan.problem.waypoints, atol=1e-9)
+    for t in fewer.breakpoints[1:-1]:
         for order in range(4):
-            before, after = (fewer.trajectory(t + side, order) for side in (-1e-9, 1e-9))
-            there = long_plan.trajectory(t, order)
+            before, after = (fewer(t + side, order) for side in (-1e-9, 1e-9))
             np.testing.assert_allclose(before, after, atol=1e-4)
-            np.testing.assert_allclose(after, there, atol=1e-4)
-    assert len(merged(long_plan, 1).trajectory) == len(long_plan.pieces)
+            np.testing.assert_allclose(after, motion(t, order), atol=1e-4)
 
 
 def test_samples_are_read_as_the_quintics_through_them() -> None:

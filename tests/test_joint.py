@@ -887,6 +887,13 @@ def test_parts_are_no_more_than_allowed():
         assert sum(t == min(m, wanted) for t, m in zip(totals, range(8, 40), strict=True)) > 28
 
 
+def test_legs_alike_share_what_there_is():
+    for most in range(8, 33):
+        parts = parts_for(np.full(8, 0.5), 1e-4, most)
+        assert parts.sum() == most
+        assert parts.max() - parts.min() <= 1
+
+
 def test_nothing_idle_needs_no_parts():
     np.testing.assert_array_equal(parts_for(np.zeros(4), 0.1, None), [1, 1, 1, 1])
     np.testing.assert_array_equal(parts_for(np.array([0.0, -1e-20]), 0.1, 2), [1, 1])

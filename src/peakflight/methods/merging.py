@@ -50,7 +50,7 @@ def changes(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
     pair = _pairs(trajectory)
     order = basis.counts(trajectory.degree)[1] - 1
     first = np.arange(len(pair))[:, None]
-    t = pair.segment_times[:, None] * np.linspace(0.0, 1.0, SAMPLES)
+    t = pair.segment_times[:, None] * ((np.arange(SAMPLES) + 0.5) / SAMPLES)
     border = trajectory.segment_times[:-1, None]
     later = t > border
     change = pair.at(first, t, order) - trajectory.at(first + later, t - border * later, order)
