@@ -243,6 +243,15 @@ class TestShow:
         assert f"off samples by {fit[0]:.1e} m, {fit[1]:.1e} m/s" in said
         assert json.loads(run(*arguments, "--json").stdout)["fit_errors"] == [list(fit), None]
         assert "(samples.csv)" in said
+        found = json.loads(run(*arguments, "--json").stdout)
+        assert found["bound"] == pytest.approx(found["distance"] - fit[0], abs=1e-6)
+
+    def test_a_separation_is_kept_by_samples_too_or_not_proven(self, run: Run) -> None:
+        near = json.loads(run("show", "samples.csv", "other.json", "--json").stdout)
+        between = 0.5 * (near["distance"] + near["bound"])
+        result = run("show", "samples.csv", "other.json", "--separation", f"{between:.9f}")
+        assert result.exit_code == 1
+        assert "less what they are off samples" in result.stderr
         assert "samples" not in run("show", "plan.json", "other.json").stdout
 
     @pytest.mark.parametrize(

@@ -8,11 +8,13 @@ import pytest
 
 import peakflight as pf
 from peakflight.errors import InvalidFile, InvalidProblem
-from peakflight.formats import FLIGHT_WRITERS, read_course, write_crazyflie, write_samples
+from peakflight.formats import read_course, write_crazyflie, write_samples
 from peakflight.heading import heading
 
 POSITION_ERROR = 3e-8
 """m, and m/s; what nine significant digits cost (ecosystem notes)."""
+WRITERS = {"samples": write_samples, "crazyflie": write_crazyflie}
+"""Plain files, with neither refit nor report."""
 
 
 class CrazyflieFile:
@@ -53,39 +55,36 @@ def angle_between(a, b):
 # ---- what every writer does -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", FLIGHT_WRITERS)
+@pytest.mark.parametrize("name", WRITERS)
 class TestEveryWriter:
     def test_writes_its_file_and_returns_notes(self, name, hand_plan, tmp_path):
-        writer = FLIGHT_WRITERS[name]
-        notes = writer.write(hand_plan(), tmp_path / writer.filename)
-        assert notes == ()
-        assert [path.name for path in tmp_path.iterdir()] == [writer.filename]
-        assert writer.summary
+        assert WRITERS[name](hand_plan(), tmp_path / "file.csv") == ()
+        assert [path.name for path in tmp_path.iterdir()] == ["file.csv"]
 
     def test_overwrites(self, name, hand_plan, tmp_path):
         path = tmp_path / "file.csv"
         path.write_text("old")
-        FLIGHT_WRITERS[name].write(hand_plan(), path)
+        WRITERS[name](hand_plan(), path)
         assert "old" not in path.read_text()
 
     def test_no_folder_is_one_clear_error(self, name, hand_plan, tmp_path):
         with pytest.raises(InvalidFile, match="nowhere"):
-            FLIGHT_WRITERS[name].write(hand_plan(), tmp_path / "nowhere" / "file.csv")
+            WRITERS[name](hand_plan(), tmp_path / "nowhere" / "file.csv")
 
     def test_folder_is_one_clear_error(self, name, hand_plan, tmp_path):
         with pytest.raises(InvalidFile, match="is a folder"):
-            FLIGHT_WRITERS[name].write(hand_plan(), tmp_path)
+            WRITERS[name](hand_plan(), tmp_path)
 
     def test_a_thousand_pieces_are_fast(self, name, hand_plan, tmp_path):
         plan = hand_plan(pieces=(2,) * 500, yaw=[0.1] * 501, seconds=(0.1, 0.2))
         start = time.process_time()
-        FLIGHT_WRITERS[name].write(plan, tmp_path / "file.csv")
+        WRITERS[name](plan, tmp_path / "file.csv")
         assert time.process_time() - start < 2.0  # some 0.05 s here
 
     def test_no_negative_zeros(self, name, hand_plan, tmp_path):
         path = tmp_path / "file.csv"
         back = pf.Trajectory([[[-0.0] * 3, [-1.0] * 3]], [1.0])
-        FLIGHT_WRITERS[name].write(replace(hand_plan(pieces=(1,)), trajectory=back), path)
+        WRITERS[name](replace(hand_plan(pieces=(1,)), trajectory=back), path)
         fields = path.read_text().replace("\n", ",").split(",")
         assert "-0" not in fields
         assert "0" in fields

@@ -244,3 +244,9 @@ def test_a_motion_under_limits_on_rotors_leaves_its_nose_free():
     made = pf.import_trajectory(file, limits=rotors).plan
     assert made.problem.heading.policy == "free"
     assert made.feasible, made.message
+
+
+def test_either_the_path_or_another_plan(plan, tmp_path):
+    write_samples(plan, tmp_path / "s.csv")
+    with pytest.raises(pf.InvalidProblem, match=r"retime flies the path .* ask for one of them"):
+        pf.import_trajectory(tmp_path / "s.csv", limits=LIMITS, retime=True, method="joint")

@@ -103,6 +103,32 @@ def test_the_bound_is_below_every_sample_and_near_the_nearest(seeds, delays, pie
     assert found.distance <= distances.min() + WITHIN
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_drones_that_are_off_their_trajectories_keep_the_bound(seed):
+    """Off by so much in any direction, heights counted by the norm."""
+    flights = [wandering(10 * seed + index, pieces=2) for index in range(3)]
+    off = np.array([0.05, 0.0, 0.2])
+    kept = {"separation": 0.8, "downwash": 0.4}
+    plain = closest_approach(flights, **kept)
+    found = closest_approach(flights, **kept, off=off)
+    expected = plain.bounds - 2.0 * off[plain.pairs].sum(axis=1)
+    np.testing.assert_allclose(found.bounds, np.maximum(expected, 0.0), atol=1e-12)
+    assert found.bound == found.bounds.min()
+    np.testing.assert_array_equal(found.distances, plain.distances)
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        ways = rng.normal(size=(3, 3))
+        ways *= (off / np.linalg.norm(ways, axis=1))[:, None]
+        moved = [flight.translate(way) for flight, way in zip(flights, ways, strict=True)]
+        assert (closest_approach(moved, **kept).distances >= found.bounds - 1e-12).all()
+
+
+@pytest.mark.parametrize("off", [[0.1, -0.1], [0.1, np.nan], [np.inf, 0.0]])
+def test_bad_offs_are_refused(off):
+    with pytest.raises(pf.InvalidProblem, match=r"plan [01] is off by .* m; it must be from 0 to"):
+        closest_approach([wandering(1), wandering(2)], off=off)
+
+
 def test_many_drones_as_pair_by_pair():
     flights = [wandering(seed, pieces=3 + seed % 3) for seed in range(6)]
     delays = np.linspace(0.0, 2.0, 6)

@@ -104,7 +104,8 @@ def import_trajectory(
     retime
         Fly the path as fast as the limits allow.
     method
-        Plan anew through the joints as waypoints, by this method, in place of keeping the path.
+        Plan anew through the joints as waypoints, by this method, in place of keeping the path;
+        not together with `retime`.
     tolerance
         How near polynomials come to a file of samples, m.
 
@@ -113,10 +114,15 @@ def import_trajectory(
     InvalidFile
         If the file cannot be read or holds no trajectory.
     InvalidProblem
-        If no limits are given and the file has none, or the motion has no plan: it stays where it
-        is, or its degree is above 11.
+        If no limits are given and the file has none, both `retime` and `method` are asked for, or
+        the motion has no plan: it stays where it is, or its degree is above 11.
     """
     began = time.perf_counter()
+    if retime and method is not None:
+        raise InvalidProblem(
+            f"retime flies the path of the file, and method {method} plans another, as fast as "
+            "it can be; ask for one of them"
+        )
     if not isinstance(source, TrajectoryFile):
         source = read_trajectory_file(source, tolerance=tolerance)
     flight = source.trajectory

@@ -40,7 +40,8 @@ class ClosestApproach:
     distance: float
     """How near they come, m, in the norm of the separation."""
     bound: float
-    """What no distance of any pair ever falls below, proven, m; within 1e-6 m of `distance`."""
+    """What no distance of any pair ever falls below, proven, m; within 1e-6 m of `distance`, less
+    what drones may be off."""
     positions: np.ndarray
     """(2, 3) m, where the two are then."""
     separation: float | None
@@ -68,6 +69,7 @@ def closest_approach(
     separation: float | None = None,
     downwash: float | None = None,
     delays: ArrayLike | None = None,
+    off: ArrayLike | None = None,
 ) -> ClosestApproach:
     """How near drones come to each other, with a proven lower bound.
 
@@ -84,6 +86,9 @@ def closest_approach(
         m, to be kept above and below; as `separation` if it is left out.
     delays
         (n,) s; none by default.
+    off
+        (n,) m, how far from its trajectory each may be: of samples, how near polynomials come to
+        them. Bounds are lower by what the two of a pair may be off together. None by default.
 
     Raises
     ------
@@ -93,6 +98,7 @@ def closest_approach(
     flights = [plan.trajectory if isinstance(plan, Plan) else plan for plan in plans]
     scale = _scale(separation, downwash)
     late = _delays(delays, len(flights))
+    astray = _off(off, len(flights))
     if len(flights) < 2:
         raise InvalidProblem(f"{len(flights)} plans given; a distance needs two at least")
     for index, flight in enumerate(flights):
@@ -120,6 +126,7 @@ def closest_approach(
         breakpoints[index, 1:count] = np.minimum(borders, last)
     found, bounds = _nearest(coefficients, breakpoints, counts, scale)
     pairs = np.column_stack(np.triu_indices(len(flights), 1))
+    bounds = np.maximum(bounds - scale.max() * astray[pairs].sum(axis=1), 0.0)
     worst = int(found[:, 1].argmin())
     first, second = (int(number) for number in pairs[worst])
     when = zero + float(found[worst, 0])
@@ -178,6 +185,16 @@ def _delays(delays: ArrayLike | None, count: int) -> np.ndarray:
             f"delay {index} is {late[index]} s; it must be finite, within {LARGEST_DELAY:g} s"
         )
     return late
+
+
+def _off(off: ArrayLike | None, count: int) -> np.ndarray:
+    astray = as_float_array("off", np.zeros(count) if off is None else off, (count,))
+    if not ((astray >= 0.0) & (astray <= FARTHEST)).all():
+        index = int((~((astray >= 0.0) & (astray <= FARTHEST))).argmax())
+        raise InvalidProblem(
+            f"plan {index} is off by {astray[index]} m; it must be from 0 to {FARTHEST:g} m"
+        )
+    return astray
 
 
 def _begins(flights: Sequence[Trajectory], late: np.ndarray) -> tuple[float, np.ndarray]:

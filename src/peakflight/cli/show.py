@@ -101,16 +101,24 @@ def show(
             if source.fit_errors is not None:
                 fits[index] = source.fit_errors
         progress.stage("measuring distances")
-        found = closest_approach(flights, separation=separation, downwash=downwash, delays=delays)
+        found = closest_approach(
+            flights,
+            separation=separation,
+            downwash=downwash,
+            delays=delays,
+            off=[fits[index][0] if index in fits else 0.0 for index in range(len(files))],
+        )
     if as_json:
         print_json(_as_dict(found, files, fits))
     else:
         _print(found, files, fits)
     if found.is_kept is False:
-        one, two = (_name(files, number) for number in found.pair)
+        worst = int(found.bounds.argmin())
+        one, two = (_name(files, number) for number in found.pairs[worst])
+        counted = ", less what they are off samples" if fits else ""
         click.echo(
-            f"peakflight: {one} and {two} come as near as {found.distance:.6g} m at "
-            f"{found.time:.4f} s; {separation:g} m are asked for",
+            f"peakflight: {one} and {two} come as near as {found.distances[worst]:.6g} m at "
+            f"{found.times[worst]:.4f} s{counted}; {separation:g} m are asked for",
             err=True,
         )
         return 1
@@ -140,7 +148,7 @@ def _print(found: "ClosestApproach", files: tuple[Path, ...], fits: Fits) -> Non
     if fits:
         worst = max(fits, key=lambda index: fits[index][0])
         out.line(
-            "note: the proof is about polynomials, which are off samples by "
+            "note: the proof is about polynomials; it counts that they are off samples by "
             f"{amounts(fits[worst])} at most ({_name(files, worst)})"
         )
     nearest = found.distances.argsort(kind="stable")[:SHOWN]

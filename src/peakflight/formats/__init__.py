@@ -3,9 +3,7 @@
 from peakflight.formats.courses import COURSE_READERS, LARGEST_FILE, Reader, read_course
 from peakflight.formats.flight_files import (
     FLIGHT_FORMATS,
-    FLIGHT_WRITERS,
     FlightFormat,
-    Writer,
     find_format,
     write_crazyflie,
     write_samples,
@@ -14,11 +12,9 @@ from peakflight.formats.flight_files import (
 __all__ = [
     "COURSE_READERS",
     "FLIGHT_FORMATS",
-    "FLIGHT_WRITERS",
     "LARGEST_FILE",
     "FlightFormat",
     "Reader",
-    "Writer",
     "find_format",
     "read_course",
     "write_crazyflie",

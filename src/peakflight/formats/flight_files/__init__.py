@@ -4,11 +4,7 @@ A format is an `Encoded` of plans and the reading back of it: see `FlightFormat`
 file and one line here.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
-
 from peakflight.errors import InvalidProblem, quoted
-from peakflight.files import PathLike
 from peakflight.formats.flight_files import (
     agilicious,
     compressed,
@@ -23,7 +19,6 @@ from peakflight.formats.flight_files import (
 from peakflight.formats.flight_files.crazyswarm import write_crazyflie
 from peakflight.formats.flight_files.flight_format import Encoded, FlightFormat, Precision, Reading
 from peakflight.formats.flight_files.samples import write_samples
-from peakflight.result import Plan
 
 FLIGHT_FORMATS = {
     "samples": samples.FORMAT,
@@ -46,33 +41,14 @@ OTHER_NAMES = {"crazyflie": "crazyswarm"}
 USUAL = ("samples", "crazyswarm")
 """What is written where nothing is asked for."""
 
-
-class Writer(NamedTuple):
-    """How a format of flight file is written, without refit or report."""
-
-    filename: str
-    """What the file is called unless the user says otherwise."""
-    write: Callable[[Plan, PathLike], tuple[str, ...]]
-    """Writes a plan to a path; returns notes for whoever flies it, one line each."""
-    summary: str
-    """What the file is, for help texts."""
-
-
-FLIGHT_WRITERS = {
-    "samples": Writer(samples.FORMAT.filename, write_samples, samples.FORMAT.summary),
-    "crazyflie": Writer(crazyswarm.FORMAT.filename, write_crazyflie, crazyswarm.FORMAT.summary),
-}
-
 __all__ = [
     "FLIGHT_FORMATS",
-    "FLIGHT_WRITERS",
     "OTHER_NAMES",
     "USUAL",
     "Encoded",
     "FlightFormat",
     "Precision",
     "Reading",
-    "Writer",
     "find_format",
     "write_crazyflie",
     "write_samples",

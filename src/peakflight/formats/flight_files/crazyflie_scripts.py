@@ -13,10 +13,20 @@ from peakflight.formats.flight_files.flight_format import (
     single,
 )
 from peakflight.formats.flight_files.rounded import MILLI
-from peakflight.formats.flight_files.script import HEIGHT, described, rows_text, script, value_in
+from peakflight.formats.flight_files.script import (
+    HEIGHT,
+    described,
+    rows_text,
+    script,
+    template_text,
+    value_in,
+)
 from peakflight.result import Plan
 
 ROW = f"({', '.join(['%.9g'] * crazyswarm.NUMBERS)}),"
+
+FLYING = "cflib_flying.py.in"
+"""Take-off to landing, the same however a flight was uploaded."""
 
 
 def encode_cflib(plan: Plan, name: str = "") -> Encoded:
@@ -29,6 +39,7 @@ def encode_cflib(plan: Plan, name: str = "") -> Encoded:
             described=described(plan, CFLIB.held),
             pieces=rows_text(rows),
             height=f"{_height(plan):.9g}",
+            flying=template_text(FLYING),
         ),
         notes,
     )
@@ -54,6 +65,7 @@ def encode_compressed(plan: Plan, name: str = "") -> Encoded:
             yaw=f"{curves.points[0, 0, 3] * compressed.ANGLE:.9g}",
             duration=curves.milliseconds.sum() * MILLI,
             height=f"{_height(plan):.9g}",
+            flying=template_text(FLYING),
         ),
         notes,
     )

@@ -26,8 +26,12 @@ HARMFUL = re.compile(r"[^\w .+-]")
 
 def script(template: str, **values: Any) -> bytes:
     """A script: the template's `$names` replaced by values, text as it is."""
-    text = files("peakflight.formats.flight_files").joinpath(FOLDER, template).read_text("utf-8")
-    return Template(text).substitute(version=__version__, **values).encode()
+    return Template(template_text(template)).substitute(version=__version__, **values).encode()
+
+
+def template_text(name: str) -> str:
+    """The text of a template, or of a part that several of them have."""
+    return files("peakflight.formats.flight_files").joinpath(FOLDER, name).read_text("utf-8")
 
 
 def described(plan: Plan, held: int) -> str:
