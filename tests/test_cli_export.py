@@ -136,7 +136,8 @@ def test_bad_input_is_one_line(run: Run, folder: Path) -> None:
     refused(run("export", "one/plan.json", "two/plan.json", "--to", "px4"), "holds one drone")
     refused(run("export", "one/plan.json", "--to", "px4", "-o", "no/f.py"), "cannot be written")
     lift = ("export", "one/plan.json", "--to", "px4", "--lift")
-    refused(run(*lift, "up"), "'up' is neither auto nor a number of m")
+    for text in ("up", "1_5"):
+        refused(run(*lift, text), f"'{text}' is neither auto nor a number of m")
     refused(run(*lift, "-1"), "lift is -1 m; it must be auto or a number of m from 0 on")
     values = json.loads(Path("one/plan.json").read_text())
     values["problem"]["vehicle"] = None

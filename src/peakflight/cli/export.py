@@ -13,6 +13,7 @@ from peakflight.cli.progress import Progress
 from peakflight.errors import InvalidFile, quoted
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.formats.flight_files import OTHER_NAMES, find_format
+from peakflight.numerals import as_number
 from peakflight.result import Plan
 from peakflight.wording import ratio_cells, seconds
 from peakflight.yaw import ALL_LABELS
@@ -41,7 +42,7 @@ class Lift(click.ParamType):  # type: ignore[type-arg]
         if not isinstance(value, str) or value == "auto":
             return value
         try:
-            return float(value)
+            return as_number(value)
         except ValueError:
             self.fail(f"{quoted(value)} is neither auto nor a number of m", param, ctx)
 
