@@ -178,12 +178,7 @@ def test_one_leg_of_one_piece_is_known(degree):
 @pytest.mark.parametrize(
     ("name", "limit", "order"),
     [
-        pytest.param(
-            "speed",
-            2.0,
-            1,
-            marks=pytest.mark.xfail(reason="legs are no longer cut at 1.006", strict=False),
-        ),
+        ("speed", 2.0, 1),
         ("jerk", 30.0, 3),
         ("snap", 200.0, 4),
     ],
