@@ -52,8 +52,8 @@ getcontext().prec = 60
 
 
 def exact_demands(coefficients, duration, figures, places):
-    """(n, 2) T + c |alpha| and g - T + c |alpha| at normalised times, to 50 digits."""
-    reach, drag, along_drag = (Fraction(float(figure)) for figure in figures)
+    """(n, 2) T + A and g - T + A, A = c |alpha| + chi |w|^2, at normalised times, to 50 digits."""
+    reach, drag, along_drag, crossed = (Fraction(float(figure)) for figure in figures)
     found = []
     for place in places:
         time = Fraction(float(place)) * Fraction(duration)
@@ -78,13 +78,19 @@ def exact_demands(coefficients, duration, figures, places):
             continue
         twice = 2 * sum(x * y for x, y in zip(thrust, jerk, strict=True)) / square
         swing = [s - twice * j for s, j in zip(snap, jerk, strict=True)]
-        (a, b, c), (x, y, z) = thrust, swing
-        turn = (b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2
-        size, turn = root(square), decimal(reach) * root(turn) / decimal(square)
+        turn = decimal(reach) * root(crossing(thrust, swing)) / decimal(square)
+        turn += decimal(crossed * crossing(thrust, jerk) / square**2)
+        size = root(square)
         pull = sum(x * y for x, y in zip(thrust, velocity, strict=True))
         size += decimal(along_drag * pull) / size
         found.append((size + turn, decimal(Fraction(GRAVITY)) - size + turn))
     return found
+
+
+def crossing(one, other):
+    """The square of the vector product."""
+    (a, b, c), (x, y, z) = one, other
+    return (b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2
 
 
 def decimal(value):
@@ -113,9 +119,11 @@ def check_pieces(shape, count, seed):
     """Returns how often the bound was shown to be close."""
     close = 0
     for coefficients, duration, rng in nasty_pieces(shape, count, seed):
-        figures = np.array([10.0 ** rng.uniform(-3.0, 0.0), 0.0, 0.0])
+        figures = np.array([10.0 ** rng.uniform(-3.0, 0.0), 0.0, 0.0, 0.0])
         if rng.uniform() < 0.5:  # with drag
-            figures[1:] = 10.0 ** rng.uniform(-2.0, 0.0), rng.normal() * 0.3
+            figures[1:3] = 10.0 ** rng.uniform(-2.0, 0.0), rng.normal() * 0.3
+        if rng.uniform() < 0.5:  # with unequal inertia
+            figures[3] = 10.0 ** rng.uniform(-3.0, 0.0)
         values = np.array([GRAVITY, GRAVITY]) * 10.0 ** rng.uniform(-1.0, 1.0, size=2)
         upper, lower, place = kernel_bounds(coefficients, duration, values, figures)
         for index, kind in enumerate((MOST, LEAST)):

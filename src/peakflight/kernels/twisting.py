@@ -18,7 +18,7 @@ times their thrust then give, times four and over the mass m, at most
 
 with c = sqrt(2) I / (l m), r = I_z / I and k = I_z / (kappa m), and at least the same with the
 other signs of what turns it. If inertia differs by D between the two axes across z, and I is the
-larger, that adds at most (1 + r) D / I c |omega_z| |w| and D / (kappa m) |w|^2 / 2.
+larger, that adds at most (1 + r) D / I c |omega_z| |w| and chi |w|^2, chi = D / (2 kappa m).
 
 On intervals all of it lies within radii of lines (`kernels.lines`); bounds and subdivision are as
 in `kernels.rotors`.
@@ -31,7 +31,6 @@ from peakflight.kernels.jit import inner, kernel
 from peakflight.kernels.lines import (
     ROUNDED,
     cross,
-    dot,
     drawn,
     end_norm,
     inverse,
@@ -44,9 +43,9 @@ from peakflight.kernels.lines import (
 )
 from peakflight.kernels.rotors import (
     AXIS,
-    JERK,
     LINES,
     PULL,
+    RATE,
     SMALLEST,
     TURN,
     F,
@@ -61,9 +60,9 @@ COUNT = 4
 in the form of `kernels.rotors`."""
 SPLITS = 2000
 """Subdivisions of one part of a piece; beyond, the bound of an interval is taken as it is."""
-RATE, SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 9, LINES + 11
-"""Rows of lines after those of `rotors`, of which TURN is w': w, b', w' + r omega_z b', then
-omega_z and alpha_z."""
+SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 8
+"""Rows of lines after those of `rotors`, of which TURN is w': b', w' + r omega_z b', then omega_z
+and alpha_z."""
 
 
 @kernel
@@ -82,7 +81,7 @@ def largest(
         are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
         (K+1,) `firsts` on.
     figures
-        (7,) c, delta, epsilon, r, k, and the factors of |omega_z| |w| and of |w|^2.
+        (7,) c, delta, epsilon, chi, r, k, and the factor of |omega_z| |w|.
     limits
         (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
         least thrust may fall, as in `Limits.as_array`.
@@ -186,10 +185,6 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
     """
     if not draw(stack, row, degree, errors, sizes, nesting, figures[2], lines):
         return False
-    square = inverse(dot(lines, F, F))
-    cross(lines, F, JERK, RATE)
-    for d in range(3):
-        keep(lines, RATE + d, times(line(lines, RATE + d), square))
     cross(lines, RATE, AXIS, SWING)
     height = line(lines, AXIS + 2)
     rise = inverse((1.0 + height[0], height[1], height[2] + ROUNDED))
@@ -206,7 +201,7 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
     change = plus(change, times(times(tilting, rise), line(lines, SWING + 2)))
     keep(lines, TWIST, twist)
     keep(lines, TWIST + 1, change)
-    ratio = figures[3]
+    ratio = figures[4]
     pull = (ratio * twist[0], ratio * twist[1], ratio * twist[2])
     for d in range(3):
         swung = times(pull, line(lines, SWING + d))
@@ -225,14 +220,14 @@ def _measure(lines, figures, gravity, bounds):
     At an end of the interval it is within the radii of what it is at the ends of the lines.
     """
     bounds[2] = 0.0
-    reach, spin = figures[0], figures[4]
+    reach, crossed, spin, twisting = figures[0], figures[3], figures[5], figures[6]
     centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
     wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
     wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
     size = gravity
     # both of a product lie below their chords, and that of these exceeds its ends by at most this
     spread = abs(end_norm(lines, RATE, 1.0) - end_norm(lines, RATE, -1.0))
-    chords = 0.5 * figures[5] * spread * abs(lines[TWIST, 1])
+    chords = 0.5 * twisting * spread * abs(lines[TWIST, 1])
     for side in range(2):
         way = 2.0 * side - 1.0
         for order in range(2):
@@ -249,9 +244,9 @@ def _measure(lines, figures, gravity, bounds):
         rate = end_norm(lines, RATE, way)
         spun = abs(lines[TWIST, 0] + way * lines[TWIST, 1])
         slow = max(rate - thickness(lines, RATE), 0.0)
-        lower = (figures[5] * max(spun - lines[TWIST, 2], 0.0) + figures[6] * slow) * slow - wide
+        lower = (twisting * max(spun - lines[TWIST, 2], 0.0) + crossed * slow) * slow - wide
         fast = rate + thickness(lines, RATE)
-        upper = (figures[5] * (spun + lines[TWIST, 2]) + figures[6] * fast) * fast
+        upper = (twisting * (spun + lines[TWIST, 2]) + crossed * fast) * fast
         upper = (upper + chords + wide) * (1.0 + ROUNDED)
         bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + lower)
         bounds[0, 3] = max(bounds[0, 3], rest - thrust + lower)
