@@ -9,8 +9,8 @@ and with j and s the derivatives of F, the angular velocity and acceleration of 
 
     w = F x j / F.F,  alpha = F x (s - 2 (F.j / F.F) j) / F.F.
 
-Rotor thrusts are limited by |F| + epsilon b.v + A with A = c |alpha| + chi |w|^2, from above, and by
-g - |F| - epsilon b.v + A, which is large where the least of them is small: c is the reach of the
+Rotor thrusts are limited by |F| + epsilon b.v + A with A = c |alpha| + chi |w|^2, from above, and
+by g - |F| - epsilon b.v + A, which is large where the least of them is small: c is the reach of the
 airframe, chi what its unequal inertia takes (`docs/certificate.md`). There is no polynomial whose
 maximum these are: norms are added.
 
@@ -55,7 +55,7 @@ SMALLEST = 1e-290
 
 
 F, JERK, SNAP, TURN, SPEED, AXIS, PULL, RATE, LINES = 0, 3, 6, 9, 12, 15, 18, 19, 22
-"""Rows of lines: F, j and s, of which s is then what alpha is about; alpha, v, b, epsilon b.v, w."""
+"""Rows of lines: F, j, s, of which s is then what alpha is about; alpha, v, b, epsilon b.v, w."""
 
 
 def workspace(degree: int, figures: np.ndarray) -> tuple[np.ndarray, ...]:
