@@ -88,7 +88,7 @@ def plan(
         settings = replace(settings, **tuning)  # type: ignore[type-var]
     with jit.announced(module.kernels(problem, settings), _log):
         impossible = _contradiction(problem)
-        outcome, flight = _answered(module, problem, settings)
+        outcome, flight = _answered(method, problem, settings)
         problem = outcome.problem or problem
         pieces = outcome.pieces or (1,) * (len(problem.waypoints) - 1)
     report = flight.report
@@ -154,15 +154,14 @@ def replan(
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 
-def _answered(
-    module: methods.Method, problem: Problem, settings: Any
-) -> tuple[methods.Outcome, Steered]:
+def _answered(method: str, problem: Problem, settings: Any) -> tuple[methods.Outcome, Steered]:
     """Solve a problem and add its yaw.
 
     What turning about z takes of the rotors, the method does not know. Where they lack it, the
-    problem is solved again within so much less of their range, and the fastest flight is taken. A
-    time limit is for all of it.
+    problem is solved again within so much less of their range, from where it was if the method can
+    begin there, and the fastest flight is taken. A time limit is for all of it.
     """
+    module = methods.find(method)
     began = time.perf_counter()
     outcome = module.solve(problem, settings)
     answers = [_with_yaw(problem, outcome)]
@@ -179,13 +178,34 @@ def _answered(
             if rest <= 0.0:
                 break
             settings = replace(settings, time_limit=rest)
-        outcome = module.solve(narrow, settings)
+        outcome = module.solve(narrow, _going_on(method, problem, settings, answers[-1]))
         outcome = replace(outcome, iterations=outcome.iterations + answers[-1][0].iterations)
         answers.append(_with_yaw(problem, outcome))
     return min(
         answers,
         key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
     )
+
+
+def _going_on(
+    method: str, problem: Problem, settings: Any, answer: tuple[methods.Outcome, Steered]
+) -> Any:
+    """Settings with which a method begins where it has ended, if it can."""
+    outcome, flight = answer
+    if "initial" not in _fields(type(settings)) or outcome.status is Status.INFEASIBLE:
+        return settings
+    ended = Plan(
+        problem=outcome.problem or problem,
+        method=method,
+        status=outcome.status,
+        trajectory=outcome.trajectory,
+        report=flight.report,
+        pieces=outcome.pieces or (1,) * (len(problem.waypoints) - 1),
+        iterations=outcome.iterations,
+        wall_time_s=0.0,
+        memory=outcome.memory,
+    )
+    return replace(settings, initial=ended)
 
 
 def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outcome, Steered]:
