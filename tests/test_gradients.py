@@ -18,8 +18,8 @@ pytestmark = pytest.mark.kernels
 NAN = np.nan
 NAMES = [kind.name for kind in KINDS]
 FIGURES = np.array([0.05, 0.4, -0.15, 0.08])
-"""Of the airframe, m, 1/s, 1/s and m: turning counts as much as thrust in the samples below, and drag
-a little."""
+"""Of the airframe, m, 1/s, 1/s and m: turning counts as much as thrust in the samples below, and
+drag a little."""
 
 
 # ---- kernels --------------------------------------------------------------------------------

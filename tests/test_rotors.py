@@ -290,6 +290,34 @@ def test_three_starts_end_alike_on_slow_courses_with_short_legs(name):
     assert max(durations) <= 1.01 * min(durations)
 
 
+def any_direction(index):
+    """(legs+1, 3) legs of 0.2 to 10 m, even in the logarithm, in any direction."""
+    rng = np.random.default_rng([20240229, index])
+    legs = int(rng.integers(4, 13))
+    directions = rng.normal(size=(legs, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    lengths = np.exp(rng.uniform(*np.log((0.2, 10.0)), size=(legs, 1)))
+    return np.vstack((np.zeros(3), np.cumsum(lengths * directions, axis=0)))
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "index"),
+    [
+        ("crazyflie-2.1", 4),  # past straight down, where the proof was loose
+        ("hummingbird", 5),  # likewise, upright
+        ("crazyflie-brushless", 9),  # unequal inertia
+        ("racing-quad", 0),  # stalled before legs were cut
+        ("racing-quad", 7),  # and never solved from the guess
+    ],
+)
+def test_no_other_start_is_much_faster(vehicle, index):
+    problem = Problem(any_direction(index), vehicle=find_vehicle(vehicle).on_rotors())
+    made = plan(problem)
+    assert made.report.feasible
+    others = [plan(problem, initial="peak"), plan(problem, method="peak")]
+    assert made.duration <= 1.05 * min(other.duration for other in others if other.feasible)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("limits", [RACING, CRAZYFLIE])
 def test_every_method_keeps_rotor_limits(method, limits):
