@@ -75,7 +75,8 @@ time that it takes to find out."""
 FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
 OTHERS: tuple[Literal["peak", "proportional"], ...] = ("peak", "proportional")
-"""Starts that are tried where the first leads to much less than its runs had promised."""
+"""Starts that are tried where the first leads to no run that ends, or to much less than they had
+promised."""
 MISSED = 0.02
 """Part of the time by which an answer under limits on rotors is then slower than its best run."""
 RETRIES = 4
@@ -223,7 +224,8 @@ def _best(task: _Task, problem: Problem) -> Outcome:
         found = replace(_finished(task, runs), iterations=count, history=_history(runs))
         answers.append(replace(found, problem=task.problem))
         promised = min(run.objective for run in runs)
-        is_kept = found.trajectory.duration <= (1.0 + MISSED) * promised
+        has_ended = any(run.ended for run in runs)
+        is_kept = has_ended and found.trajectory.duration <= (1.0 + MISSED) * promised
         is_free = task.settings.initial == "guess" and _may_miss(task.problem)
         if (is_kept and found.status is not Status.INFEASIBLE) or not is_free or task.is_late:
             break
