@@ -17,9 +17,9 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 NAMES = [kind.name for kind in KINDS]
-FIGURES = np.array([0.05, 0.4, -0.15])
-"""Of the airframe, m, 1/s and 1/s: turning counts as much as thrust in the samples below, and drag
-a little."""
+FIGURES = np.array([0.05, 0.4, -0.15, 0.08])
+"""Of the airframe, m, 1/s, 1/s and m: turning counts as much as thrust in the samples below, and
+drag a little."""
 
 
 # ---- kernels --------------------------------------------------------------------------------
@@ -260,7 +260,7 @@ def keeps(name, derivatives, limit):
     if name == "tilt":
         return np.arctan2(np.linalg.norm(thrust[:, :2], axis=1), thrust[:, 2]) / limit
     if name in ROTORS:  # room: what hovering leaves
-        reach, drag, along_drag = FIGURES
+        reach, drag, along_drag, crossed = FIGURES
         velocity = derivatives[0]
         carried = derivatives.copy()
         carried[1:] += drag * derivatives[:-1]
@@ -268,6 +268,7 @@ def keeps(name, derivatives, limit):
         size = np.linalg.norm(thrust, axis=1)
         size = size + along_drag * (thrust * velocity).sum(axis=1) / size
         turn = reach * keeps("angular_acceleration", carried, 1.0)
+        turn = turn + crossed * keeps("body_rate", carried, 1.0) ** 2
         if name == "rotor_thrust":
             return (size + turn) / limit
         return (GRAVITY - size + turn) / limit

@@ -17,8 +17,12 @@ pytestmark = pytest.mark.kernels
 
 NAN = np.nan
 LEANING = TURNING = np.ones(1)
-AIRFRAME = Airframe(mass=0.85, inertia=1e-2, lever=0.106, drag=(0.2, 0.5))
-"""Its reach makes turning count as much as thrust in the samples below, and its drag counts too."""
+AIRFRAME = Airframe(
+    mass=0.85, inertia=1e-2, lever=0.106, yaw_inertia=1.5e-2, torque_per_thrust=0.02,
+    inertia_difference=4e-3, drag=(0.2, 0.5),
+)  # fmt: skip
+"""Its reach makes turning count as much as thrust in the samples below; so does unequal inertia at
+the faster ones, and its drag counts too."""
 FIGURES = AIRFRAME.figures
 NAMES = tuple(kind.name for kind in KINDS)
 LIMITS = np.array([5.0, 15.5, 62.0, 800.0, 0.7, 8.0, 3.0, 25.0, 22.0, 8.0])
@@ -161,11 +165,12 @@ def plain_values(kind, samples):
     if kind < 6:
         return limited_values([v, a, j, s])[NAMES[kind]]
     if kind > 7:  # with drag, which the derivatives of the thrust have too
-        drag, along_drag = FIGURES[1:]
+        drag, along_drag = FIGURES[1:3]
         thrust, j, s = thrust + drag * v, j + drag * a, s + drag * j
     square = (thrust**2).sum(axis=1)
+    rate = np.linalg.norm(np.cross(thrust, j), axis=1) / square
     if kind == 6:
-        return np.linalg.norm(np.cross(thrust, j), axis=1) / square
+        return rate
     turn = (thrust * j).sum(axis=1) / square
     swing = np.linalg.norm(np.cross(thrust, s - 2.0 * turn[:, None] * j), axis=1) / square
     if kind == 7:
@@ -173,7 +178,8 @@ def plain_values(kind, samples):
     rest, sign = (0.0, 1.0) if kind == 8 else (GRAVITY, -1.0)
     size = np.sqrt(square)
     size = size + along_drag * (thrust * v).sum(axis=1) / size
-    return rest + sign * size + AIRFRAME.reach * swing
+    uneven = AIRFRAME.inertia_difference / (AIRFRAME.torque_per_thrust * AIRFRAME.mass)
+    return rest + sign * size + AIRFRAME.reach * swing + 0.5 * uneven * rate**2
 
 
 def ratio_of(kind, values, limit):

@@ -13,7 +13,7 @@ import peakflight as pf
 from peakflight.errors import InvalidProblem
 from peakflight.kernels import lines, twisting
 from peakflight.kernels.jit import kernel
-from peakflight.limits import GRAVITY, KINDS, ROTORS
+from peakflight.limits import GRAVITY, KINDS, ROTORS, limited_values
 from peakflight.trajectory import Trajectory
 from peakflight.twist import turning_about_z, untwisted
 from peakflight.twist_certificate import TOLERANCE, _cut, certify_twist
@@ -148,6 +148,109 @@ def test_straight_up_the_nose_stays():
     assert made.report.feasible
 
 
+def random_motion(rng, count):
+    """(4, count, 3) derivatives 1 to 4 of the sizes that they have in fast flight."""
+    return rng.normal(size=(4, count, 3)) * np.array([4.0, 7.0, 60.0, 900.0])[:, None, None]
+
+
+def swing_of(derivatives, vehicle):
+    """Thrust over mass, b, and its angular velocity and acceleration, from derivatives of b."""
+    velocity, acceleration, jerk, snap = derivatives
+    across, along = np.array(vehicle.drag) / vehicle.mass
+    force = acceleration + np.array([0.0, 0.0, GRAVITY]) + across * velocity
+    change, bent = jerk + across * acceleration, snap + across * jerk
+    size = np.linalg.norm(force, axis=1, keepdims=True)
+    b = force / size
+    growth = (b * change).sum(axis=1, keepdims=True)
+    first = (change - growth * b) / size
+    bend = (first * change + b * bent).sum(axis=1, keepdims=True)
+    second = (bent - bend * b - 2.0 * growth * first) / size
+    thrust = size[:, 0] + (along - across) * (b * velocity).sum(axis=1)
+    return thrust, b, np.cross(b, first), np.cross(b, second)
+
+
+def free_yaw(derivatives, heading, vehicle):
+    """Yaw, and its rate and acceleration at which the vehicle does not turn about its thrust."""
+    still = pf.flat_states(derivatives, vehicle, yaw=(heading, 0.0, 0.0))
+    yaw = (heading, -still.body_rate[:, 2], 0.0)
+    rate = pf.flat_states(derivatives, vehicle, yaw=yaw)
+    assert np.abs(rate.body_rate[:, 2]).max() <= 1e-9
+    return heading, yaw[1], -rate.angular_acceleration[:, 2]
+
+
+def test_a_free_nose_asks_of_each_rotor_what_the_formula_says():
+    """The torques J_x w'_x, J_y w'_y and (J_y - J_x) w_x w_y of a body that does not twist."""
+    rng = np.random.default_rng(7)
+    derivatives = random_motion(rng, 500)
+    heading = rng.uniform(-np.pi, np.pi, 500)
+    states = pf.flat_states(derivatives, ODD, yaw=free_yaw(derivatives, heading, ODD))
+    thrust, b, rate, change = swing_of(derivatives, ODD)
+    w, x, y, z = states.attitude.T  # to the axes of the body, in the world
+    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+    left = np.cross(b, forward)
+    rates = [(rate * axis).sum(axis=1) for axis in (forward, left)]
+    changes = [(change * axis).sum(axis=1) for axis in (forward, left)]
+    roll, pitch = ODD.inertia[0] * changes[0], ODD.inertia[1] * changes[1]
+    about = (ODD.inertia[1] - ODD.inertia[0]) * rates[0] * rates[1] / ODD.torque_per_thrust
+    lever = ODD.airframe.lever
+    for i, ((ahead, beside), spin) in enumerate(zip(ODD.rotor_positions, ODD.spins, strict=True)):
+        turning = (np.sign(beside) * roll - np.sign(ahead) * pitch) / lever - spin * about
+        expected = 0.25 * (ODD.mass * thrust + turning)
+        size = ODD.mass * thrust + np.abs(roll) / lever + np.abs(pitch) / lever + np.abs(about)
+        assert (np.abs(states.rotor_thrust[:, i] - expected) <= 1e-12 * size).all()
+
+
+@pytest.mark.parametrize("vehicle", [RACER, ODD], ids=lambda vehicle: vehicle.name)
+def test_what_is_limited_is_beyond_every_free_heading(vehicle):
+    """And not far, where inertia is even: some heading has it."""
+    rng = np.random.default_rng(8)
+    derivatives = random_motion(rng, 200)
+    values = limited_values(list(derivatives), vehicle.airframe)
+    most, least = np.full(200, -np.inf), np.full(200, np.inf)
+    for turned in np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False):
+        yaw = free_yaw(derivatives, np.full(200, turned), vehicle)
+        thrusts = pf.flat_states(derivatives, vehicle, yaw=yaw).rotor_thrust
+        most = np.maximum(most, thrusts.max(axis=1))
+        least = np.minimum(least, thrusts.min(axis=1))
+    spread = most - least
+    assert (most <= values["rotor_thrust"] + 1e-12 * spread).all()
+    assert (least >= values["least_rotor_thrust"] - 1e-12 * spread).all()
+    if vehicle is RACER:  # headings are looked at every 2 degrees
+        assert (most >= values["rotor_thrust"] - 1e-3 * spread).all()
+        assert (least <= values["least_rotor_thrust"] + 1e-3 * spread).all()
+
+
+def test_unequal_inertia_takes_what_it_takes_of_a_thrust_that_swings_evenly():
+    """At w without w' rotors have no more to do than the yaw torque of unequal inertia."""
+    force = np.array([0.0, 0.0, 12.0])
+    rate = np.array([9.0, 0.0, 0.0])
+    change = np.cross(rate, force)
+    bent = np.cross(rate, change)
+    velocity = np.zeros(3)
+    even = replace(ODD.airframe, drag=(0.0, 0.0))
+    motion = [velocity, force - [0.0, 0.0, GRAVITY], change, bent]
+    values = limited_values([one[None] for one in motion], even)
+    uneven = 0.5 * 3e-4 * 81.0 / (ODD.torque_per_thrust * ODD.mass)
+    for name, sign in zip(ROTORS, (1.0, -1.0), strict=True):
+        assert values[name][0] == pytest.approx(0.125 * (12.0 + sign * uneven), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["crazyflie-2.1-upgrade", "crazyflie-brushless"])
+def test_a_free_nose_takes_no_more_than_was_planned_for(name):
+    """Unequal inertia is in the plan: the proof with the yaw finds nothing else to slow it for."""
+    vehicle = pf.find_vehicle(name).on_rotors()
+    made = pf.plan(WAYPOINTS, vehicle=vehicle)
+    assert_as_seen(made)
+    assert "slowed" not in made.message
+    without = pf.certify(made.trajectory, made.problem.limits).peaks
+    for kind in ROTORS:
+        assert (made.report.peaks[kind] <= without[kind] + 1e-3).all()
+        even = replace(made.problem.limits.airframe, inertia_difference=0.0)
+        easier = pf.certify(made.trajectory, replace(made.problem.limits, airframe=even)).peaks
+        assert (easier[kind] <= without[kind]).all()
+        assert (easier[kind] < without[kind] - 1e-3).any()
+
+
 # ---- limits about the body --------------------------------------------------------------------
 
 
@@ -236,6 +339,45 @@ def test_bounds_lie_above_an_independent_model_and_close(vehicle, seed):
         )
         for name in ROTORS:
             assert peaks[name][k] >= sampled[name] * (1.0 - 1e-12)
+
+
+def demands(flight, yaw, vehicle, times):
+    """(2, n) N, the most and the least of a rotor at the worst heading: what is bounded."""
+    derivatives = [flight(times, order) for order in range(1, 5)]
+    thrust, b, rate, change = swing_of(derivatives, vehicle)
+    turn = [yaw(times, order)[:, 0] for order in range(3)]
+    states = pf.states_along(flight, times, vehicle, yaw=turn)
+    about, faster = states.body_rate[:, 2], np.abs(states.angular_acceleration[:, 2])
+    reach, _, _, crossed, ratio, spin, twisting = vehicle.airframe.steering
+    swung = change + ratio * about[:, None] * np.cross(rate, b)
+    size = np.linalg.norm(rate, axis=1)
+    turning = reach * np.linalg.norm(swung, axis=1) + spin * faster
+    turning += (twisting * np.abs(about) + crossed * size) * size
+    return 0.25 * vehicle.mass * np.stack([thrust + turning, thrust - turning])
+
+
+@pytest.mark.parametrize("vehicle", [RACER, ODD], ids=lambda vehicle: vehicle.name)
+@pytest.mark.parametrize(("aside", "rounding"), [(0.3, 1e-4), (0.1, 1e-4), (0.03, 2e-3)], ids=str)
+def test_bounds_are_close_where_the_thrust_swings_past_straight_down(vehicle, aside, rounding):
+    """Its yaw swings round there, and what that takes cancels all but for rounding.
+
+    1 + b_3 falls to 3e-3, 3e-4 and 3e-5.
+    """
+    fall = np.array(
+        [[0, 0, 0], [1.0, 0, 0], [-2.0, aside, -GRAVITY / 2 - 4.0], [6.0, 0, 0.5]], float
+    )
+    flight = Trajectory(fall[None], [0.4])
+    yaw = untwisted(flight, np.array([4]), vehicle.airframe, closeness=1e-3)
+    problem = pf.Problem(WAYPOINTS, vehicle=vehicle)
+    peaks, _ = certify_twist(problem, problem.heading, yaw, flight)
+    times = np.linspace(1e-9, 0.4 - 1e-9, 400_001)
+    most, least = demands(flight, yaw, vehicle, times)
+    hover = 0.25 * vehicle.mass * GRAVITY
+    for name, reached in (
+        ("rotor_thrust", most.max() / problem.limits.rotor_thrust),
+        ("least_rotor_thrust", (hover - least.min()) / (hover - vehicle.rotor_thrust[0])),
+    ):
+        assert reached * (1.0 - 1e-9) <= peaks[name][0] <= reached + rounding * max(reached, 1.0)
 
 
 def test_the_bound_is_what_the_formula_gives_at_the_worst_heading():

@@ -14,7 +14,7 @@ SMALLEST, LARGEST = 1e-9, 1e9
 NUMBERS = ("mass", "inertia", "lever", "yaw_inertia", "torque_per_thrust")
 """The fields that are a positive number each; the last two may be unknown."""
 
-SPIN = 4
+SPIN = 5
 """Which of `Airframe.steering` an acceleration about z multiplies."""
 
 
@@ -81,9 +81,18 @@ class Airframe:
 
     @property
     def figures(self) -> np.ndarray:
-        """(3,) c, delta and epsilon of `kernels.rotors`: reach, m, and drag over mass, 1/s."""
+        """(4,) c, delta, epsilon and chi of `kernels.rotors`.
+
+        Reach, m; drag over mass, 1/s; and the collective acceleration that unequal inertia takes
+        from a rotor at worst where the thrust direction swings at 1 rad/s, m: 0 if nothing says
+        what a torque about z takes.
+        """
         across, along = self.drag
-        return np.array([self.reach, across / self.mass, (along - across) / self.mass])
+        crossed = 0.0
+        if self.torque_per_thrust is not None:
+            crossed = 0.5 * self.inertia_difference / (self.torque_per_thrust * self.mass)
+        drag = (across / self.mass, (along - across) / self.mass)
+        return np.array([self.reach, *drag, crossed])
 
     @property
     def can_steer(self) -> bool:
@@ -96,15 +105,14 @@ class Airframe:
 
         After the `figures`, the ratio of the moments of inertia; the collective acceleration that
         an angular acceleration of 1 rad/s^2 about z takes from a rotor, m; and what unequal inertia
-        across z takes: of a product with the rate about z, m, and of a squared rate across it, m.
+        across z takes of a product of the rates about z and across it, m.
         """
         if self.yaw_inertia is None or self.torque_per_thrust is None:
             raise InvalidProblem("airframe has no yaw_inertia and torque_per_thrust")
         spin = self.yaw_inertia / (self.torque_per_thrust * self.mass)
         ratio, uneven = self.yaw_inertia / self.inertia, self.inertia_difference
         twisting = (1.0 + ratio) * uneven / self.inertia * self.reach
-        crossed = 0.5 * uneven / (self.torque_per_thrust * self.mass)
-        return np.array([*self.figures, ratio, spin, twisting, crossed])
+        return np.array([*self.figures, ratio, spin, twisting])
 
     def to_dict(self) -> dict[str, Any]:
         """What is known, by name, from which `from_dict` makes the same."""

@@ -6,10 +6,11 @@ in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joi
 line, goes through `KINDS`.
 
 Rotor thrusts follow from the motion and the airframe, for the worst heading. With the thrust T, of
-which drag is a part, the angular acceleration alpha of its direction and the airframe's reach c,
-every rotor of a vehicle of mass m that does not twist about its thrust gives between
-(T - m c |alpha|) / 4 and (T + m c |alpha|) / 4 (`kernels.rotors`). A yaw that is held or steered
-twists the vehicle, which takes more: `twist_certificate` proves that.
+which drag is a part, the angular velocity w and acceleration alpha of its direction, the airframe's
+reach c, and chi for its unequal inertia, every rotor of a vehicle of mass m that does not twist
+about its thrust gives between (T - m A) / 4 and (T + m A) / 4 with A = c |alpha| + chi |w|^2
+(`kernels.rotors`). A yaw that is held or steered twists the vehicle, which takes more:
+`twist_certificate` proves that.
 """
 
 import math
@@ -170,7 +171,7 @@ class Limits:
 
     @property
     def figures(self) -> np.ndarray | None:
-        """(3,) of the airframe where rotor thrust is limited; else kernels leave it out."""
+        """(4,) of the airframe where rotor thrust is limited; else kernels leave it out."""
         if self.airframe is None or not self.on_rotors:
             return None
         return self.airframe.figures
@@ -304,9 +305,10 @@ def limited_values(
         jerk = derivatives[2]
         values["angular_acceleration"] = _swing(thrust, jerk, derivatives[3])
     if len(derivatives) >= 4 and airframe is not None:
-        reach, drag, along_drag = airframe.figures
-        force = thrust + drag * derivatives[0]
-        turning = reach * _swing(force, jerk + drag * derivatives[1], derivatives[3] + drag * jerk)
+        reach, drag, along_drag, crossed = airframe.figures
+        force, change = thrust + drag * derivatives[0], jerk + drag * derivatives[1]
+        turning = reach * _swing(force, change, derivatives[3] + drag * jerk)
+        turning = turning + crossed * _turn(force, change) ** 2
         size = np.linalg.norm(force, axis=-1)
         pull = (force * derivatives[0]).sum(axis=-1) / np.where(size > 0.0, size, np.inf)
         for name, sign in zip(ROTORS, (1.0, -1.0), strict=True):

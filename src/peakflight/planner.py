@@ -23,6 +23,9 @@ _log = logging.getLogger("peakflight")
 
 RESERVES = 3
 """Most times that a problem is solved again with less of the rotors' range."""
+OFF = 3e-4
+"""Part of what hovering leaves of the rotors' range that a free nose is off by at most: that of
+`yaw_motion.CLOSE`."""
 EASED = 1.1
 """Thrust that is set aside then, over what was lacking."""
 ENOUGH = 1.003
@@ -88,7 +91,7 @@ def plan(
         settings = replace(settings, **tuning)  # type: ignore[type-var]
     with jit.announced(module.kernels(problem, settings), _log):
         impossible = _contradiction(problem)
-        outcome, flight = _answered(module, problem, settings)
+        outcome, flight = _answered(method, problem, settings)
         problem = outcome.problem or problem
         pieces = outcome.pieces or (1,) * (len(problem.waypoints) - 1)
     report = flight.report
@@ -154,20 +157,19 @@ def replan(
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 
-def _answered(
-    module: methods.Method, problem: Problem, settings: Any
-) -> tuple[methods.Outcome, Steered]:
+def _answered(method: str, problem: Problem, settings: Any) -> tuple[methods.Outcome, Steered]:
     """Solve a problem and add its yaw.
 
     What turning about z takes of the rotors, the method does not know. Where they lack it, the
-    problem is solved again within so much less of their range, and the fastest flight is taken. A
-    time limit is for all of it.
+    problem is solved again within so much less of their range, from where it was if the method can
+    begin there, the last time anew, and the fastest flight is taken. A time limit is for all of it.
     """
+    module = methods.find(method)
     began = time.perf_counter()
-    outcome = module.solve(problem, settings)
+    narrow, limit = _spared(problem), getattr(settings, "time_limit", None)
+    outcome = module.solve(narrow, settings)
     answers = [_with_yaw(problem, outcome)]
-    narrow, limit = problem, getattr(settings, "time_limit", None)
-    for _ in range(RESERVES):
+    for left in range(RESERVES - 1, -1, -1):
         lacking = answers[-1][1].lacking
         longer = answers[-1][1].trajectory.duration / outcome.trajectory.duration
         if not lacking or (answers[-1][1].report.feasible and longer < ENOUGH):
@@ -179,13 +181,48 @@ def _answered(
             if rest <= 0.0:
                 break
             settings = replace(settings, time_limit=rest)
-        outcome = module.solve(narrow, settings)
+        begin = _going_on(method, problem, settings, answers[-1]) if left else settings
+        outcome = module.solve(narrow, begin)
         outcome = replace(outcome, iterations=outcome.iterations + answers[-1][0].iterations)
         answers.append(_with_yaw(problem, outcome))
     return min(
         answers,
         key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
     )
+
+
+def _spared(problem: Problem) -> Problem:
+    """The problem with what a free nose is off by kept free of the rotors' range.
+
+    A flight at its limits would exceed them by that, and may be all that is feasible far around: a
+    slower one passes nearer to free fall.
+    """
+    rooms, heading = problem.limits.rotor_rooms, problem.heading
+    if not rooms or heading is None or heading.policy != "free" or not problem.is_at_rest:
+        return problem
+    off = OFF * min(rooms.values())
+    return replace(problem, limits=problem.limits.sparing(dict.fromkeys(rooms, off)))
+
+
+def _going_on(
+    method: str, problem: Problem, settings: Any, answer: tuple[methods.Outcome, Steered]
+) -> Any:
+    """Settings with which a method begins where it has ended, if it can."""
+    outcome, flight = answer
+    if "initial" not in _fields(type(settings)) or outcome.status is Status.INFEASIBLE:
+        return settings
+    ended = Plan(
+        problem=outcome.problem or problem,
+        method=method,
+        status=outcome.status,
+        trajectory=outcome.trajectory,
+        report=flight.report,
+        pieces=outcome.pieces or (1,) * (len(problem.waypoints) - 1),
+        iterations=outcome.iterations,
+        wall_time_s=0.0,
+        memory=outcome.memory,
+    )
+    return replace(settings, initial=ended)
 
 
 def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outcome, Steered]:

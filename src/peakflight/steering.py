@@ -22,8 +22,11 @@ ROUNDS = 40
 """Most such steps."""
 CLOSE = 1.001
 """Ratio of the least stretch that did and the largest that did not at which the search ends."""
+JUST = (1.0 + 1e-9) / CLOSE
+"""Part of a stretch that did which ends the search if it does not."""
 SPARE = 1e-4
-"""Part of the limits of a heading that is left where they were exceeded by rounding of the yaw."""
+"""Part of the limits of a heading that is left for rounding of the yaw: at once where it follows a
+direction, for the rest where they were exceeded."""
 
 
 class Steered(NamedTuple):
@@ -102,14 +105,16 @@ def _about_body(
     """Limits of the body's turning, and of its rotors with it: the stretch is searched for.
 
     How the body turns about its thrust depends on gravity, so the yaw is found anew for every
-    stretch. The least one that does is closed in between what did and what did not.
+    stretch. The least one that does is closed in between what did and what did not: what is guessed
+    from an excess is mostly right, so a little less is tried first.
     """
     from peakflight.yaw_motion import turning
 
     best: Steered | None = None
     lacking: dict[str, float] | None = None
     slow, fast = math.inf, 0.0
-    stretch, share = 1.0, 1.0
+    stretch, is_guess = 1.0, True
+    share = 1.0 / (1.0 + SPARE) if problem.heading and problem.heading.follows else 1.0
     for _ in range(ROUNDS):
         flight = trajectory if stretch == 1.0 else trajectory.stretch(stretch)
         turned = turning(problem, flight, pieces, share=share)
@@ -129,7 +134,8 @@ def _about_body(
         if best is None:
             stretch *= max(turned.stretch, excess.stretch, NEARER)
         else:
-            stretch = math.sqrt(max(fast, 1.0) * slow)
+            middle = math.sqrt(max(fast, 1.0) * slow)
+            stretch, is_guess = max(middle, JUST * slow) if is_guess else middle, False
     if best is None:
         return found._replace(too_fast=not problem.is_at_rest, lacking=lacking or {})
     cost = _slower(slow, "the yaw and what it takes") if slow > CLOSE else ""

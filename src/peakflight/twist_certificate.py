@@ -66,7 +66,7 @@ def _figures(problem: Problem) -> np.ndarray:
         return np.zeros(7)
     if problem.airframe.can_steer:
         return problem.airframe.steering
-    return np.concatenate((problem.airframe.figures, np.zeros(4)))
+    return np.concatenate((problem.airframe.figures, np.zeros(3)))
 
 
 def _bounds(

@@ -52,7 +52,7 @@ ROUNDS = 30
 """Most linear programs to the smallest stretch; 2 to 8 are usual."""
 CLOSENESS = 1e-7
 """Relative change of the stretch at which that ends."""
-CLOSE = 1e-3
+CLOSE = 3e-4
 """Part of what turning about z may take that a free nose may be off by."""
 FINER = 2
 """Parts of the yaw without turning to one of the spline that is added to it, at least."""

@@ -84,7 +84,7 @@ class Limited(NamedTuple):
     turning: np.ndarray | None
     """Some number if how the thrust direction turns is limited; None likewise."""
     figures: np.ndarray | None
-    """(1,) of the airframe, m, if rotor thrust is limited; None likewise."""
+    """(4,) of the airframe, as in `kernels.rotors`, if rotor thrust is limited; None likewise."""
     several: np.ndarray | None
     """Some number if a kind has more than one term; None likewise."""
     effort: np.ndarray | None

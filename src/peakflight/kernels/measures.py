@@ -77,7 +77,7 @@ def add_slopes(
     """Weights (4, S), vertical (S,) += grown (S,) times the slope of (log m)/e; values hold m.
 
     Kinds from TURNING on add to pulls (3, 4, S) instead; it is None where none of them is limited,
-    which is known when the kernel is compiled. So are the figures (3,) of `kernels.rotors`:
+    which is known when the kernel is compiled. So are the figures (4,) of `kernels.rotors`:
     None where no rotor thrust is limited.
     """
     if figures is None:
@@ -276,7 +276,7 @@ def _with_drag(samples, count, drag):
 
 @vector
 def _load(sign, samples, q, gravity, figures):
-    """1 / |F|, F.v / F.F, +-(T - g), c |alpha| (rounded by EASE) and |alpha|^2 of a sample.
+    """1 / |F|, F.v / F.F, +-(T - g), c |alpha| (rounded by EASE), |alpha|^2 and |w|^2 of a sample.
 
     Of `_with_drag`; T = |F| + epsilon b.v, all as in `kernels.rotors`.
     """
@@ -287,24 +287,26 @@ def _load(sign, samples, q, gravity, figures):
     norm = np.sqrt(square)
     moved = (fx * samples[0, 0, q] + fy * samples[1, 0, q] + fz * samples[2, 0, q]) / square
     turn = _turn_of(samples, q, 3, gravity)
+    rate = _turn_of(samples, q, 2, gravity)
     swing = np.sqrt(figures[0] * figures[0] * turn + (EASE * gravity) ** 2)
     over = sign * (norm * (1.0 + figures[2] * moved) - gravity)
-    return 1.0 / norm, moved, over, swing, turn
+    return 1.0 / norm, moved, over, swing, turn, rate
 
 
 @vector
 def _demand(sign, samples, count, limit, gravity, figures, values):
     """Square of the stretch at which a rotor would be at its limit, if demands scaled as below.
 
-    What is limited is +-(T - g) + c |alpha|, with T as in `_load` and c the reach of the airframe:
-    at most the room that hovering leaves. Stretched by x^(-1/2), it is about the first times x and
-    the second times x^2; 1/x solves room/x^2 - (+-(T - g))/x - c |alpha| = 0.
+    What is limited is +-(T - g) + A with A = c |alpha| + chi |w|^2, all as in `_load`: at most the
+    room that hovering leaves. Stretched by x^(-1/2), it is about the first times x and the second
+    times x^2, or less; 1/x solves room/x^2 - (+-(T - g))/x - A = 0.
     """
     room = limit - gravity if sign > 0.0 else limit
     carried = _with_drag(samples, count, figures[1])
     for q in range(count):
-        _, _, over, swing, _ = _load(sign, carried, q, gravity, figures)
-        values[q] = (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room)
+        _, _, over, swing, _, rate = _load(sign, carried, q, gravity, figures)
+        turning = swing + figures[3] * rate
+        values[q] = (over + np.sqrt(over * over + 4.0 * room * turning)) / (2.0 * room)
 
 
 @vector
@@ -313,16 +315,18 @@ def _add_demand(sign, samples, count, limit, gravity, figures, values, grown, pu
     carried = _with_drag(samples, count, figures[1])
     own = np.zeros((3, 4, count))
     for q in range(count):
-        inverse, moved, over, swing, square = _load(sign, carried, q, gravity, figures)
-        root = np.sqrt(over * over + 4.0 * room * swing)
+        inverse, moved, over, swing, square, rate = _load(sign, carried, q, gravity, figures)
+        root = np.sqrt(over * over + 4.0 * room * (swing + figures[3] * rate))
         push = 0.5 * grown[q] / root
         along = sign * inverse * push
         for x in range(3):
             thrust = carried[x, 1, q] + (gravity if x == 2 else 0.0)
             own[x, 0, q] = along * figures[2] * thrust
             own[x, 1, q] = along * (thrust + figures[2] * (carried[x, 0, q] - moved * thrust))
-        weight = 0.5 * push / (values[q] + TINY) * figures[0] * figures[0] * square / swing
-        _pull_turn(carried, q, 3, gravity, weight, square, own)
+        weight = push / (values[q] + TINY)
+        bent = 0.5 * weight * figures[0] * figures[0] * square / swing
+        _pull_turn(carried, q, 3, gravity, bent, square, own)
+        _pull_turn(carried, q, 2, gravity, weight * figures[3] * rate, rate, own)
     for x in range(3):
         for row in range(4):
             for q in range(count):

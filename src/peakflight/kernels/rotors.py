@@ -5,13 +5,14 @@ velocity, the thrust is m (|F| + epsilon b.v) along b = F / |F|, where
 
     F = a + g e3 + delta v,  delta = d / m,  epsilon = (e - d) / m,
 
-and with j and s the derivatives of F, the angular acceleration of its direction is
+and with j and s the derivatives of F, the angular velocity and acceleration of its direction are
 
-    alpha = F x (s - 2 (F.j / F.F) j) / F.F.
+    w = F x j / F.F,  alpha = F x (s - 2 (F.j / F.F) j) / F.F.
 
-Rotor thrusts are limited by |F| + epsilon b.v + c |alpha|, from above, and by
-g - |F| - epsilon b.v + c |alpha|, which is large where the least of them is small. There is no
-polynomial whose maximum these are: norms are added.
+Rotor thrusts are limited by |F| + epsilon b.v + A with A = c |alpha| + chi |w|^2, from above, and
+by g - |F| - epsilon b.v + A, which is large where the least of them is small: c is the reach of the
+airframe, chi what its unequal inertia takes (`docs/certificate.md`). There is no polynomial whose
+maximum these are: norms are added.
 
 On an interval every component of F, j, s and v lies within a radius of a line, and arithmetic on
 such lines (`kernels.lines`) gives a line and a radius for all the rest. Norms are convex: that of a
@@ -53,13 +54,13 @@ SMALLEST = 1e-290
 """What underflows is not zero: added to bounds."""
 
 
-F, JERK, SNAP, TURN, SPEED, AXIS, PULL, LINES = 0, 3, 6, 9, 12, 15, 18, 19
-"""Rows of lines: F, j and s, of which s is then what alpha is about; alpha, v, b, epsilon b.v."""
+F, JERK, SNAP, TURN, SPEED, AXIS, PULL, RATE, LINES = 0, 3, 6, 9, 12, 15, 18, 19, 22
+"""Rows of lines: F, j, s, of which s is then what alpha is about; alpha, v, b, epsilon b.v, w."""
 
 
 def workspace(degree: int, figures: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Scratch arrays: intervals that wait; lines; a motion at a point. And figures (3,): c in m,
-    delta and epsilon in 1/s.
+    """Scratch arrays: intervals that wait; lines; a motion at a point. And figures (4,): c in m,
+    delta and epsilon in 1/s, chi in m.
     """
     n = max(degree - 1, 0)
     return np.empty((DEPTH + 3, n + 1, 12)), np.empty((LINES, 3)), np.empty((4, 3)), figures
@@ -100,7 +101,7 @@ def largest_demand(
         nesting = ends[waiting, 2]
         bound = np.inf
         if draw(stack, waiting, degree, errors, sizes, nesting, figures[2], lines):
-            bound = _bound(sign, lines, figures[0], gravity)
+            bound = _bound(sign, lines, figures, gravity)
         size = max(low, limit)
         gap = bound - max(
             _demand(sign, stack[waiting, 0], figures, gravity),
@@ -204,13 +205,17 @@ def _demand(sign, point, figures, gravity):
     z = point[2]
     square = x * x + y * y + z * z
     twice = 2.0 * (x * point[3] + y * point[4] + z * point[5]) / square
+    e = y * point[5] - z * point[4]
+    f = z * point[3] - x * point[5]
+    h = x * point[4] - y * point[3]
+    turn = figures[3] * (e * e + f * f + h * h) / (square * square)
     u = point[6] - twice * point[3]
     v = point[7] - twice * point[4]
     w = point[8] - twice * point[5]
     e = y * w - z * v
     f = z * u - x * w
     h = x * v - y * u
-    turn = figures[0] * np.sqrt(e * e + f * f + h * h) / square
+    turn += figures[0] * np.sqrt(e * e + f * f + h * h) / square
     thrust = np.sqrt(square)
     thrust += figures[2] * (x * point[9] + y * point[10] + z * point[11]) / thrust
     rest = gravity if sign < 0.0 else 0.0
@@ -239,8 +244,10 @@ def draw(stack, row, degree, errors, sizes, nesting, along_drag, lines):
         swing = plus(line(lines, SNAP + d), times(twice, line(lines, JERK + d)))
         keep(lines, SNAP + d, swing)
     cross(lines, F, SNAP, TURN)
+    cross(lines, F, JERK, RATE)
     for d in range(3):
         keep(lines, TURN + d, times(line(lines, TURN + d), square))
+        keep(lines, RATE + d, times(line(lines, RATE + d), square))
         keep(lines, AXIS + d, times(line(lines, F + d), share))
     pull = dot(lines, AXIS, SPEED)
     size = abs(pull[0]) + abs(pull[1]) + pull[2]
@@ -250,22 +257,23 @@ def draw(stack, row, degree, errors, sizes, nesting, along_drag, lines):
 
 
 @inner
-def _bound(sign, lines, reach, gravity):
-    """Upper bound of what is limited, from the lines of F and alpha."""
+def _bound(sign, lines, figures, gravity):
+    """Upper bound of what is limited, from the lines of F, alpha and w."""
     centre = np.sqrt(lines[0, 0] ** 2 + lines[1, 0] ** 2 + lines[2, 0] ** 2) * (1.0 + ROUNDED)
     bound = -np.inf
     size = gravity
     for side in range(2):
         way = 2.0 * side - 1.0
         thrust = end_norm(lines, F, way)
-        turn = reach * end_norm(lines, TURN, way)
+        rate = end_norm(lines, RATE, way) + thickness(lines, RATE)
+        turn = figures[0] * end_norm(lines, TURN, way) + figures[3] * rate * rate
         pull = lines[PULL, 0] + way * lines[PULL, 1]
         size = max(size, gravity + thrust + abs(pull) + turn)
         if sign > 0.0:
             bound = max(bound, thrust + pull + turn)
         else:
             bound = max(bound, gravity - along(lines, way) / centre - pull + turn)
-    bound += thickness(lines, F) + lines[PULL, 2] + reach * thickness(lines, TURN)
+    bound += thickness(lines, F) + lines[PULL, 2] + figures[0] * thickness(lines, TURN)
     bound = bound * (1.0 + ROUNDED) + 2.0 * ROUNDED * size + SMALLEST
     return np.inf if np.isnan(bound) else bound
 

@@ -54,7 +54,7 @@ def constrain(
 
     samples (3, 4, S): axes, derivatives, samples; limits, values (R, S) of kinds, this one's in row
     r; slopes (P, 3, S) and bends (P, S) hold the terms of this kind from `first` on, in the order
-    of `KIND_TERMS`; leaning, turning, figures (3,) of `kernels.rotors`: None if no kind of
+    of `KIND_TERMS`; leaning, turning, figures (4,) of `kernels.rotors`: None if no kind of
     theirs is limited.
     """
     if kind == 1:
@@ -401,15 +401,26 @@ def _pulled(samples, q):
     return total
 
 
+@inner
+def _rate(samples, q, turn, pull):
+    """|j across F|^2 of a sample."""
+    size = 0.0
+    for x in range(3):
+        across, _ = _across(samples, x, q, turn, pull)
+        size += across * across
+    return size
+
+
 @vector
 def _demand(sign, figures, samples, limits, gravity, values, r, first, slopes, bends):
-    """(T + c |alpha|) / L - 1 for the most, (g - T + c |alpha| - L) / g for the least thrust.
+    """(T + A) / L - 1 for the most, (g - T + A - L) / g for the least thrust.
 
-    T = |F| + epsilon b.v, and c |alpha| is rounded by ROUNDNESS, to the safe side; all as in
-    `kernels.rotors`. The stretch x^-2 is that at which +-(T - g) x + c |alpha| x^2 would meet the
-    limit. What is found by F with drag and its derivatives is carried over to those of position.
+    T = |F| + epsilon b.v and A = c |alpha| + chi |w|^2, of which c |alpha| is rounded by ROUNDNESS,
+    to the safe side; all as in `kernels.rotors`. The stretch x^-2 is that at which +-(T - g) x +
+    A x^2 would meet the limit. What is found by F with drag and its derivatives is carried over to
+    those of position.
     """
-    reach, drag, along_drag = figures[0], figures[1], figures[2]
+    reach, drag, along_drag, crossed = figures[0], figures[1], figures[2], figures[3]
     carried = _with_drag(samples, drag, gravity)
     worst = 0.0
     for q in range(samples.shape[2]):
@@ -418,23 +429,29 @@ def _demand(sign, figures, samples, limits, gravity, values, r, first, slopes, b
         moved = _pulled(carried, q) / square
         size = _swing(carried, q, turn, pull)
         swing = np.sqrt(reach * reach * size / square + (ROUNDNESS * gravity) ** 2)
+        rate = _rate(carried, q, turn, pull) / square
         room = limits[r, q] - gravity if sign > 0.0 else limits[r, q]
         over = sign * (norm * (1.0 + along_drag * moved) - gravity)
-        worst = max(worst, (over + np.sqrt(over * over + 4.0 * room * swing)) / (2.0 * room))
+        turning = swing + crossed * rate
+        worst = max(worst, (over + np.sqrt(over * over + 4.0 * room * turning)) / (2.0 * room))
         unit = 1.0 / limits[r, q] if sign > 0.0 else 1.0 / gravity
-        values[r, q] = unit * (over + swing - room)
+        values[r, q] = unit * (over + turning - room)
         bend = unit * reach * reach / (swing * square)
         _swing_slopes(carried, q, square, turn, pull, bend, first + 1, slopes, bends)
+        whirl = 2.0 * unit * crossed / square
         push = sign * unit / norm
         for x in range(3):
             thrust = carried[x, 1, q]
             velocity = carried[x, 0, q]
             own = thrust + along_drag * (velocity - moved * thrust)
-            slopes[first + 1, x, q] += push * own
+            across, _ = _across(carried, x, q, turn, pull)
+            slopes[first + 1, x, q] += push * own - whirl * (turn * across + rate * thrust)
+            slopes[first + 2, x, q] += whirl * across
             slopes[first, x, q] = push * along_drag * thrust + drag * slopes[first + 1, x, q]
             for term in range(1, 3):
                 slopes[first + term, x, q] += drag * slopes[first + term + 1, x, q]
-        bends[first + 1, q] += max(push, 0.0)
+        bends[first + 1, q] += max(push, 0.0) + whirl * rate
+        bends[first + 2, q] += whirl
         bends[first, q] = drag * drag * bends[first + 1, q]
         for term in range(1, 3):
             bends[first + term, q] += drag * drag * bends[first + term + 1, q]
@@ -457,5 +474,6 @@ def _demand_kappa(sign, figures, samples, limit, gravity, out):
         square, turn, pull = _turn_of(carried, q, gravity)
         norm = np.sqrt(square)
         thrust = norm + figures[2] * _pulled(carried, q) / norm
-        swing = figures[0] * np.sqrt(_swing(carried, q, turn, pull) / square)
-        out[q] = (rest + sign * thrust + swing) / limit
+        turning = figures[0] * np.sqrt(_swing(carried, q, turn, pull) / square)
+        turning += figures[3] * _rate(carried, q, turn, pull) / square
+        out[q] = (rest + sign * thrust + turning) / limit

@@ -98,7 +98,7 @@ def workspace(degree: int) -> tuple[np.ndarray, ...]:
     """
     n = max(degree - 2, 0)
     stack = np.empty((DEPTH + 3, n + 1, 9))
-    return stack, np.empty((ROWS, 8 * n + 1)), np.empty((4, 3)), np.zeros(3)
+    return stack, np.empty((ROWS, 8 * n + 1)), np.empty((4, 3)), np.zeros(4)
 
 
 @inner
@@ -397,6 +397,10 @@ def _excess(order, sign, figures, motion, log_stretch, limit, gravity):
     u = motion[2, 0] * (square * power) + drag * motion[1, 0] * square
     v = motion[2, 1] * (square * power) + drag * motion[1, 1] * square
     w = motion[2, 2] * (square * power) + drag * motion[1, 2] * square
+    rate = 0.0
+    if sign != 0.0:
+        along = (x * u + y * v + z * w) / length
+        rate = max(u * u + v * v + w * w - along * along * length, 0.0) / length
     if order == 4:
         along = 2.0 * (x * u + y * v + z * w) / length
         drag *= square * power
@@ -413,7 +417,7 @@ def _excess(order, sign, figures, motion, log_stretch, limit, gravity):
         thrust = np.sqrt(length)
         pull = x * motion[0, 0] + y * motion[0, 1] + z * motion[0, 2]
         thrust += figures[2] * power * pull / thrust
-        value = rest + sign * thrust + figures[0] * value
+        value = rest + sign * thrust + figures[0] * value + figures[3] * rate
     if np.isnan(value):
         return 50.0
     return max(min(np.log(value / limit), 50.0), -700.0) if value > 0.0 else -700.0

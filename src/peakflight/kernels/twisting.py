@@ -18,7 +18,7 @@ times their thrust then give, times four and over the mass m, at most
 
 with c = sqrt(2) I / (l m), r = I_z / I and k = I_z / (kappa m), and at least the same with the
 other signs of what turns it. If inertia differs by D between the two axes across z, and I is the
-larger, that adds at most (1 + r) D / I c |omega_z| |w| and D / (kappa m) |w|^2 / 2.
+larger, that adds at most (1 + r) D / I c |omega_z| |w| and chi |w|^2, chi = D / (2 kappa m).
 
 On intervals all of it lies within radii of lines (`kernels.lines`); bounds and subdivision are as
 in `kernels.rotors`.
@@ -31,7 +31,6 @@ from peakflight.kernels.jit import inner, kernel
 from peakflight.kernels.lines import (
     ROUNDED,
     cross,
-    dot,
     drawn,
     end_norm,
     inverse,
@@ -44,9 +43,9 @@ from peakflight.kernels.lines import (
 )
 from peakflight.kernels.rotors import (
     AXIS,
-    JERK,
     LINES,
     PULL,
+    RATE,
     SMALLEST,
     TURN,
     F,
@@ -59,11 +58,23 @@ from peakflight.kernels.turning import DEPTH, NESTING, split
 COUNT = 4
 """What is bounded: |omega_z|, |alpha_z|, and what the most and the least of a rotor's thrusts ask,
 in the form of `kernels.rotors`."""
-SPLITS = 2000
-"""Subdivisions of one part of a piece; beyond, the bound of an interval is taken as it is."""
-RATE, SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 9, LINES + 11
-"""Rows of lines after those of `rotors`, of which TURN is w': w, b', w' + r omega_z b', then
-omega_z and alpha_z."""
+SPLITS = 4000
+"""Subdivisions of one part of a piece in a pass; beyond, the bound of an interval is taken as it
+is."""
+PASSES, CLOSER = 4, 16.0
+"""Times that a part is gone through, each closer by this than the one before: what is attained
+anywhere spares many intervals later, and where subdivisions end, the pass before has its bound."""
+ROUGHEST, FALL = 1e-4, 0.5
+"""A gap that a subdivision did not lower to the second part of what it was is rounding, if it is
+below the first part of the limit: it stays."""
+SWING, TORQUE, TWIST, ROWS = LINES, LINES + 3, LINES + 6, LINES + 8
+"""Rows of lines after those of `rotors`, of which TURN is w': b', w' + r omega_z b', then omega_z
+and alpha_z."""
+ATTAINED, PROVEN, CLOSED, HERE, INTERVAL, OWN, BOUNDS = 0, 1, 2, 3, 4, 5, 6
+"""Rows of bounds: what a piece attains, and does not exceed; what a part of it does not, by all
+passes and by this one; what an interval does not, and what it attains at its ends."""
+PART = DEPTH + 3
+"""Where the stack of intervals keeps the part that they are of."""
 
 
 @kernel
@@ -82,7 +93,7 @@ def largest(
         are wrong by at most; each piece of the flight consists of whole ones of the yaw, from
         (K+1,) `firsts` on.
     figures
-        (7,) c, delta, epsilon, r, k, and the factors of |omega_z| |w| and of |w|^2.
+        (7,) c, delta, epsilon, chi, r, k, and the factor of |omega_z| |w|.
     limits
         (COUNT,); NaN where nothing is limited. The last is how far below gravity the demand on the
         least thrust may fall, as in `Limits.as_array`.
@@ -95,18 +106,18 @@ def largest(
     """
     degree = max(coefficients.shape[1] - 2, yaw.shape[1] - 2, 0)
     whole = np.empty((2, degree + 1, 12))
-    stack = np.empty((DEPTH + 3, degree + 1, 14))
+    stack = np.empty((DEPTH + 4, degree + 1, 14))
     points = np.empty((degree + 1, 3))
     lines = np.empty((ROWS, 3))
-    state = np.empty((DEPTH + 3, 2))
+    state = np.empty((DEPTH + 3, 3))
     turned = np.empty((2, 2))
-    bounds = np.empty((3, COUNT))
+    bounds = np.empty((BOUNDS, COUNT))
     errors = np.zeros(4)
     sizes = np.zeros(4)
     for k in range(durations.size):
         bounds[:] = 0.0
         if firsts[k] == firsts[k + 1]:  # no yaw, nothing proven
-            bounds[1] = np.inf
+            bounds[PROVEN] = np.inf
         if not control_columns(
             coefficients, k, durations[k], figures[1], gravity, tables[0], tables[1], points, whole,
             errors, sizes,
@@ -121,34 +132,73 @@ def largest(
                 row = 1
             for i in range(degree + 1):
                 for c in range(12):
-                    stack[0, i, c] = whole[row, i, c]
-            state[0, 0] = float(part - firsts[k] + 1)
-            state[0, 1] = 0.0
+                    stack[PART, i, c] = whole[row, i, c]
             for order in range(2):
                 turned[order] = control_points(
                     yaw, part, parts[part], order + 1, degree, 0.0, tables[0], tables[1], points
                 )
                 turned[order, 0] += lost[part, order]
                 for i in range(degree + 1):
-                    stack[0, i, 12 + order] = points[i, 0]
+                    stack[PART, i, 12 + order] = points[i, 0]
             _close(
-                stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance,
-                lines, bounds,
+                float(part - firsts[k] + 1), stack, degree, state, errors, sizes, turned, figures,
+                limits, gravity, tolerance, lines, bounds,
             )  # fmt: skip
         for q in range(COUNT):
             upper[k, q] = np.nan
             if limits[q] > 0.0:
-                upper[k, q] = max(bounds[0, q], bounds[1, q]) / limits[q] * (1.0 + 4.0 * EPSILON)
+                reached = max(bounds[ATTAINED, q], bounds[PROVEN, q])
+                upper[k, q] = reached / limits[q] * (1.0 + 4.0 * EPSILON)
 
 
 @inner
 def _close(
+    nesting, stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance,
+    lines, bounds,
+):  # fmt: skip
+    """Raise bounds, rows ATTAINED and PROVEN, by a part of a piece: its control points in row PART.
+
+    nesting: how often it has been subdivided; turned (2, 2): error and size of the yaw's rate and
+    acceleration.
+    """
+    bounds[CLOSED] = np.inf
+    for further in range(PASSES - 1, -1, -1):
+        for i in range(degree + 1):
+            for c in range(14):
+                stack[0, i, c] = stack[PART, i, c]
+        state[0, 0] = nesting
+        state[0, 1] = 0.0
+        state[0, 2] = np.inf
+        bounds[HERE] = 0.0
+        splits = _subdivide(
+            stack, degree, state, errors, sizes, turned, figures, limits, gravity,
+            tolerance * CLOSER**further, lines, bounds,
+        )  # fmt: skip
+        is_closed = True
+        for q in range(COUNT):
+            bounds[CLOSED, q] = min(bounds[CLOSED, q], bounds[HERE, q])
+            if limits[q] > 0.0 and not _is_close(bounds, q, CLOSED, limits[q], tolerance):
+                is_closed = False
+        if is_closed or splits >= SPLITS:
+            break
+    for q in range(COUNT):
+        bounds[PROVEN, q] = max(bounds[PROVEN, q], bounds[CLOSED, q])
+
+
+@inner
+def _is_close(bounds, q, row, limit, tolerance):
+    """Whether a bound is near what is attained, relative to that or to the limit, the larger."""
+    low = bounds[ATTAINED, q]
+    return bounds[row, q] <= low + tolerance * max(low, limit)
+
+
+@inner
+def _subdivide(
     stack, degree, state, errors, sizes, turned, figures, limits, gravity, tolerance, lines, bounds
 ):
-    """Raise bounds (3, COUNT), from below, from above and of an interval, by a part of a piece.
+    """Raise row HERE of the bounds to those of all parts of row 0; returns how many splits.
 
-    In row 0 of the stack are its control points; state: how often each interval was subdivided, in
-    all and within the part; turned (2, 2): error and size of the yaw's rate and acceleration.
+    state: how often each interval was subdivided, in all and within the part, and its gap before.
     """
     waiting = 1
     splits = 0
@@ -156,25 +206,33 @@ def _close(
         waiting -= 1
         nesting = state[waiting, 0]
         depth = state[waiting, 1]
-        bounds[2] = np.inf
+        bounds[INTERVAL] = np.inf
+        bounds[OWN] = 0.0
         if _draw(stack, waiting, degree, errors, sizes, nesting, turned, figures, lines):
             _measure(lines, figures, gravity, bounds)
         is_closed = True
+        gap = 0.0
         for q in range(COUNT):
+            bounds[ATTAINED, q] = max(bounds[ATTAINED, q], bounds[OWN, q])
             if limits[q] > 0.0:
-                low = bounds[0, q]
-                if not bounds[2, q] <= low + tolerance * max(low, limits[q]):
+                size = max(bounds[ATTAINED, q], limits[q])
+                gap = max(gap, (bounds[INTERVAL, q] - bounds[OWN, q]) / size)
+                if not _is_close(bounds, q, INTERVAL, limits[q], tolerance):
                     is_closed = False
-        if is_closed or waiting >= DEPTH or splits >= SPLITS or depth >= NESTING:
+        is_rounding = gap <= ROUGHEST and gap > FALL * state[waiting, 2]
+        is_last = waiting >= DEPTH or splits >= SPLITS or depth >= NESTING
+        if is_closed or is_rounding or is_last:
             for q in range(COUNT):
-                bounds[1, q] = max(bounds[1, q], bounds[2, q])
+                bounds[HERE, q] = max(bounds[HERE, q], bounds[INTERVAL, q])
             continue
         split(stack, waiting, degree, 0.5)
         for side in range(2):
             state[waiting + side, 0] = nesting + 1.0
             state[waiting + side, 1] = depth + 1.0
+            state[waiting + side, 2] = gap
         splits += 1
         waiting += 2
+    return splits
 
 
 @inner
@@ -186,10 +244,6 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
     """
     if not draw(stack, row, degree, errors, sizes, nesting, figures[2], lines):
         return False
-    square = inverse(dot(lines, F, F))
-    cross(lines, F, JERK, RATE)
-    for d in range(3):
-        keep(lines, RATE + d, times(line(lines, RATE + d), square))
     cross(lines, RATE, AXIS, SWING)
     height = line(lines, AXIS + 2)
     rise = inverse((1.0 + height[0], height[1], height[2] + ROUNDED))
@@ -206,7 +260,7 @@ def _draw(stack, row, degree, errors, sizes, nesting, turned, figures, lines):
     change = plus(change, times(times(tilting, rise), line(lines, SWING + 2)))
     keep(lines, TWIST, twist)
     keep(lines, TWIST + 1, change)
-    ratio = figures[3]
+    ratio = figures[4]
     pull = (ratio * twist[0], ratio * twist[1], ratio * twist[2])
     for d in range(3):
         swung = times(pull, line(lines, SWING + d))
@@ -224,22 +278,22 @@ def _measure(lines, figures, gravity, bounds):
 
     At an end of the interval it is within the radii of what it is at the ends of the lines.
     """
-    bounds[2] = 0.0
-    reach, spin = figures[0], figures[4]
+    bounds[INTERVAL] = 0.0
+    reach, crossed, spin, twisting = figures[0], figures[3], figures[5], figures[6]
     centre = np.sqrt(lines[F, 0] ** 2 + lines[F + 1, 0] ** 2 + lines[F + 2, 0] ** 2)
     wide = thickness(lines, F) + reach * thickness(lines, TORQUE)
     wide += lines[PULL, 2] + spin * lines[TWIST + 1, 2]
     size = gravity
     # both of a product lie below their chords, and that of these exceeds its ends by at most this
     spread = abs(end_norm(lines, RATE, 1.0) - end_norm(lines, RATE, -1.0))
-    chords = 0.5 * figures[5] * spread * abs(lines[TWIST, 1])
+    chords = 0.5 * twisting * spread * abs(lines[TWIST, 1])
     for side in range(2):
         way = 2.0 * side - 1.0
         for order in range(2):
             end = abs(lines[TWIST + order, 0] + way * lines[TWIST + order, 1])
             radius = lines[TWIST + order, 2] + ROUNDED * end
-            bounds[0, order] = max(bounds[0, order], end - radius)
-            bounds[2, order] = max(bounds[2, order], (end + radius) * (1.0 + ROUNDED))
+            bounds[OWN, order] = max(bounds[OWN, order], end - radius)
+            bounds[INTERVAL, order] = max(bounds[INTERVAL, order], (end + radius) * (1.0 + ROUNDED))
             change = end
         thrust = end_norm(lines, F, way)
         turning = reach * end_norm(lines, TORQUE, way) + spin * change
@@ -249,16 +303,16 @@ def _measure(lines, figures, gravity, bounds):
         rate = end_norm(lines, RATE, way)
         spun = abs(lines[TWIST, 0] + way * lines[TWIST, 1])
         slow = max(rate - thickness(lines, RATE), 0.0)
-        lower = (figures[5] * max(spun - lines[TWIST, 2], 0.0) + figures[6] * slow) * slow - wide
+        lower = (twisting * max(spun - lines[TWIST, 2], 0.0) + crossed * slow) * slow - wide
         fast = rate + thickness(lines, RATE)
-        upper = (figures[5] * (spun + lines[TWIST, 2]) + figures[6] * fast) * fast
+        upper = (twisting * (spun + lines[TWIST, 2]) + crossed * fast) * fast
         upper = (upper + chords + wide) * (1.0 + ROUNDED)
-        bounds[0, 2] = max(bounds[0, 2], thrust + pull + turning + lower)
-        bounds[0, 3] = max(bounds[0, 3], rest - thrust + lower)
-        bounds[2, 2] = max(bounds[2, 2], thrust + pull + turning + upper)
-        bounds[2, 3] = max(bounds[2, 3], rest - along(lines, way) / centre + upper)
+        bounds[OWN, 2] = max(bounds[OWN, 2], thrust + pull + turning + lower)
+        bounds[OWN, 3] = max(bounds[OWN, 3], rest - thrust + lower)
+        bounds[INTERVAL, 2] = max(bounds[INTERVAL, 2], thrust + pull + turning + upper)
+        bounds[INTERVAL, 3] = max(bounds[INTERVAL, 3], rest - along(lines, way) / centre + upper)
     for q in range(2, COUNT):
-        bounds[2, q] += 3.0 * ROUNDED * size + SMALLEST
+        bounds[INTERVAL, q] += 3.0 * ROUNDED * size + SMALLEST
     for q in range(COUNT):
-        if np.isnan(bounds[2, q]):
-            bounds[2, q] = np.inf
+        if np.isnan(bounds[INTERVAL, q]):
+            bounds[INTERVAL, q] = np.inf

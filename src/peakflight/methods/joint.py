@@ -22,14 +22,13 @@ from peakflight.methods import (
     Outcome,
     limit_kernels,
     peak,
-    proportional,
     require,
     require_whole,
 )
 from peakflight.methods.classes import complete, without_class
 from peakflight.methods.exchange import exchanged
 from peakflight.methods.idle import idle_times, parts_for
-from peakflight.methods.start import Start, guess, start_of
+from peakflight.methods.start import Start, given, guess, start_of
 from peakflight.problem import Problem
 from peakflight.result import History, Plan
 from peakflight.spline import coefficients_of
@@ -75,6 +74,13 @@ MOST_EXCHANGED = 64
 time that it takes to find out."""
 FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
+OTHERS: tuple[Literal["peak", "proportional"], ...] = ("peak", "proportional")
+"""Starts that are tried where the first leads to no run that ends, or to much less than they had
+promised."""
+MISSED = 0.02
+"""Part of the time by which an answer under limits on rotors is then slower than its best run."""
+ALIKE = 2
+"""Most runs in as many pieces that are made feasible, where that may take many more runs."""
 RETRIES = 4
 """Runs from where a run has stalled; a new barrier often gets it going."""
 TIE = 1e-8
@@ -190,11 +196,8 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
                 f"{settings.pieces} pieces in each of {legs} legs are {total}; max_pieces is "
                 f"{settings.max_pieces}"
             )
-    runs = _runs(task, problem)
-    iterations = sum(run.iterations for run in runs)
-    outcome = replace(
-        _finished(task, runs), problem=completed, iterations=iterations, history=_history(runs)
-    )
+    outcome = _best(task, problem)
+    iterations = outcome.iterations
     infeasible = outcome.status is Status.INFEASIBLE
     doubtful = outcome.status is not Status.SOLVED or (legs <= FEW and settings.pieces == 1)
     if not (infeasible or (doubtful and task.effort is None)):
@@ -211,6 +214,25 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
         iterations=iterations + other.iterations,
         message=FELL_BACK,
     )
+
+
+def _best(task: _Task, problem: Problem) -> Outcome:
+    """The answer from the start that is asked for; where it misses much, of others too."""
+    answers: list[Outcome] = []
+    for initial in (task.settings.initial, *OTHERS):
+        settings = replace(task.settings, initial=initial)
+        runs = _runs(replace(task, settings=settings), problem)
+        count = sum(run.iterations for run in runs)
+        found = replace(_finished(task, runs), iterations=count, history=_history(runs))
+        answers.append(replace(found, problem=task.problem))
+        promised = min(run.objective for run in runs)
+        has_ended = any(run.ended for run in runs)
+        is_kept = has_ended and found.trajectory.duration <= (1.0 + MISSED) * promised
+        is_free = task.settings.initial == "guess" and _may_miss(task.problem)
+        if (is_kept and found.status is not Status.INFEASIBLE) or not is_free or task.is_late:
+            break
+    best = min(answers, key=lambda one: (one.status is Status.INFEASIBLE, one.trajectory.duration))
+    return replace(best, iterations=sum(answer.iterations for answer in answers))
 
 
 def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
@@ -231,7 +253,8 @@ def _effort(problem: Problem, settings: Settings) -> np.ndarray | None:
 def _runs(task: _Task, problem: Problem) -> list[_Run]:
     """Run by run towards the answer: whole legs first, then cut where it pays."""
     settings = task.settings
-    start, begin = _given(task, problem), FRESH
+    begin, most = FRESH, settings.max_pieces
+    start = given(settings.initial, problem, task.problem, pieces=settings.pieces, most=most)
     cuts = settings.pieces != 1
     if start is None:
         start = guess(task.problem, EASE_OF_MANY if cuts else EASE)
@@ -239,8 +262,11 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         begin = WARM
         cuts = cuts and not (start.pieces > 1).any()
     runs = [_run(task, start, begin, ROUGH if cuts else settings.tolerance)]
-    if cuts and not runs[0].ended:
+    has_stalled = cuts and not runs[0].ended
+    if has_stalled:
         runs.append(_from(task, runs[0], GOING_ON))
+        runs += _again(task, runs[-1])
+        has_stalled = not runs[-1].solved
     for _ in range(ROUNDS if cuts else 0):
         last = runs[-1]
         parts = _parts(task, last)
@@ -257,10 +283,15 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         runs.append(_exchanged(task, runs[-1]))
     if runs[-1].ended and not runs[-1].solved:  # nothing to cut: only a rough run so far
         runs.append(_from(task, runs[-1], GOING_ON))
-    for _ in range(RETRIES):
-        if runs[-1].solved or task.is_late:
-            break
-        runs.append(_from(task, runs[-1], AGAIN))
+    return runs if has_stalled else runs + _again(task, runs[-1])
+
+
+def _again(task: _Task, run: _Run) -> list[_Run]:
+    """Runs from where one has stalled, until one does not."""
+    runs: list[_Run] = []
+    while not run.solved and len(runs) < RETRIES and not task.is_late:
+        run = _from(task, run, AGAIN)
+        runs.append(run)
     return runs
 
 
@@ -397,6 +428,11 @@ def _eases(problem: Problem) -> bool:
     return problem.is_at_rest and problem.limits.figures is None
 
 
+def _may_miss(problem: Problem) -> bool:
+    """Whether answers may be much slower than the runs they are from: a stretch turns F."""
+    return problem.is_at_rest and problem.limits.figures is not None
+
+
 def _is_sound(layout: Layout, x: np.ndarray) -> bool:
     """Whether unknowns are numbers that a trajectory can have."""
     times = x[layout.clock]
@@ -410,7 +446,11 @@ def _is_sound(layout: Layout, x: np.ndarray) -> bool:
 def _finished(task: _Task, runs: list[_Run]) -> Outcome:
     """The best run, made feasible exactly."""
     best: Outcome | None = None
+    tried: list[int] = []
     for run in sorted(runs, key=lambda run: run.objective):
+        if _may_miss(task.problem) and tried.count(len(run.trajectory)) == ALIKE:
+            continue
+        tried.append(len(run.trajectory))
         if task.problem.is_at_rest:
             found, last = _stretched(task, run)
         else:
@@ -500,27 +540,6 @@ def _status(task: _Task, run: _Run) -> Status:
     if run.solved:
         return Status.SOLVED
     return Status.ITERATION_LIMIT if run.code == interior.LIMIT else Status.NO_PROGRESS
-
-
-def _given(task: _Task, problem: Problem) -> Start | None:
-    """The start that the settings name; None for a guess, also where a plan does not fit."""
-    settings = task.settings
-    legs = len(problem.waypoints) - 1
-    if isinstance(settings.initial, Plan):
-        plan = settings.initial
-        wanted = settings.pieces
-        if settings.max_pieces is not None and sum(plan.pieces) > settings.max_pieces:
-            return None
-        if len(plan.pieces) != legs or (wanted != "auto" and set(plan.pieces) != {wanted}):
-            return None
-        moved = problem.waypoints - plan.problem.waypoints
-        start = start_of(plan.trajectory, np.array(plan.pieces), task.problem, moved)
-        return replace(start, dual=plan.memory)
-    if settings.initial == "guess":
-        return None
-    method = peak if settings.initial == "peak" else proportional
-    found = method.solve(without_class(problem), method.Settings())
-    return start_of(found.trajectory, np.ones(legs, dtype=np.int64), task.problem)
 
 
 def _history(runs: list[_Run]) -> History:

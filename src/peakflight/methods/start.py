@@ -1,11 +1,15 @@
 """Motions for `joint` to begin from: a guess, or any trajectory."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from peakflight.kernels import basis
+from peakflight.methods import peak, proportional
+from peakflight.methods.classes import without_class
 from peakflight.problem import Problem, SplineClass
+from peakflight.result import Plan
 from peakflight.spline import SplineTask
 from peakflight.trajectory import Trajectory
 
@@ -67,3 +71,32 @@ def guess(problem: Problem, ease: float) -> Start:
     data[:, 1] = spline.coefficients[:, 1]
     data[:-1, left] = spline.coefficients[1:, 1]
     return Start(np.ones(last, dtype=np.int64), data, np.zeros((last, 3)), times)
+
+
+def given(
+    initial: Literal["guess", "proportional", "peak"] | Plan,
+    problem: Problem,
+    completed: Problem,
+    *,
+    pieces: int | Literal["auto"],
+    most: int | None,
+) -> Start | None:
+    """What is named to begin from; None for a guess, also where a plan does not fit.
+
+    completed: the problem with what it leaves to the method filled in; pieces: in each leg; most:
+    pieces in all.
+    """
+    legs = len(problem.waypoints) - 1
+    if isinstance(initial, Plan):
+        if most is not None and sum(initial.pieces) > most:
+            return None
+        if len(initial.pieces) != legs or (pieces != "auto" and set(initial.pieces) != {pieces}):
+            return None
+        moved = problem.waypoints - initial.problem.waypoints
+        start = start_of(initial.trajectory, np.array(initial.pieces), completed, moved)
+        return replace(start, dual=initial.memory)
+    if initial == "guess":
+        return None
+    method = peak if initial == "peak" else proportional
+    found = method.solve(without_class(problem), method.Settings())
+    return start_of(found.trajectory, np.ones(legs, dtype=np.int64), completed)
