@@ -273,10 +273,8 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         if not last.ended or task.is_late or (parts == 1).all():
             break
         runs.append(_from(task, _cut(last, parts), GOING_ON))
-        for _ in range(RETRIES):
-            if runs[-1].ended or task.is_late:
-                break
-            runs.append(_from(task, runs[-1], AGAIN))
+        if not runs[-1].ended:
+            runs += _again(task, runs[-1])
         if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
     if cuts and _is_short(task, runs[-1]):
