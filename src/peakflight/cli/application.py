@@ -31,6 +31,7 @@ from peakflight.cli.export import export
 from peakflight.cli.fly import fly
 from peakflight.cli.import_ import import_
 from peakflight.cli.output import print_json
+from peakflight.cli.page import page
 from peakflight.cli.paper import paper
 from peakflight.cli.plan import plan
 from peakflight.cli.plan_many import plan_many
@@ -121,6 +122,7 @@ application.add_command(import_)
 application.add_command(show)
 application.add_command(report)
 application.add_command(fly)
+application.add_command(page)
 application.add_command(paper)
 application.add_command(tune)
 application.add_command(vehicles)

@@ -1,0 +1,196 @@
+"""What is drawn of a plan, as plain arrays: the path and its colours, curves, legs, the vehicle."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from peakflight.flatness import FlatStates, planned_states, states_along
+from peakflight.heading import heading
+from peakflight.limits import KINDS, limited_values, plain_unit
+from peakflight.page.colours import along_scale
+from peakflight.result import BINDING, Plan
+from peakflight.vehicle import Vehicle
+from peakflight.vehicles import VEHICLES
+from peakflight.yaw import ALL_LABELS
+
+MOST_POINTS, LEAST_A_LEG, MOST_A_LEG = 2400, 10, 60
+"""Of the path: enough to look smooth, few enough to be sent in a frame."""
+CURVE_POINTS = 361
+"""Of each plot: about one a pixel."""
+ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
+"""Plots that are always there, limited or not."""
+PAIRED = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
+"""Limits from below, which are drawn with what they are the least of."""
+STAND_IN = replace(VEHICLES["crazyflie-2.1-upgrade"], drag=(0.0, 0.0))
+"""What is drawn where no vehicle is named: its attitude without drag is that of any other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What one plot shows."""
+
+    name: str
+    title: str
+    """With its unit."""
+    values: tuple[np.ndarray, ...]
+    """(CURVE_POINTS,) each."""
+    limits: tuple[float, ...]
+    """None, one or two, in the unit of the values."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """What one leg is like."""
+
+    index: int
+    duration: float
+    """s."""
+    length: float
+    """m, straight."""
+    peak_speed: float
+    """m/s, sampled, for orientation."""
+    limit: str
+    """What it is called that comes nearest to its limit."""
+    ratio: float
+    """Certified: the peak of that over its limit."""
+
+    @property
+    def binds(self) -> bool:
+        """Whether that limit is reached, within 0.1 %."""
+        return self.ratio >= BINDING
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """A plan as it is drawn. Nothing here is proof: that is in `plan.report`."""
+
+    plan: Plan
+
+    @cached_property
+    def path_times(self) -> np.ndarray:
+        """(P,) s, through every waypoint."""
+        times = self.plan.waypoint_times
+        legs = len(times) - 1
+        count = int(np.clip(MOST_POINTS // legs, LEAST_A_LEG, MOST_A_LEG))
+        shares = np.arange(count) / count
+        inner = times[:-1, None] + shares * np.diff(times)[:, None]
+        return np.append(inner.ravel(), times[-1])
+
+    @cached_property
+    def path(self) -> np.ndarray:
+        """(P, 3) m."""
+        return self.plan.trajectory(self.path_times)
+
+    @cached_property
+    def path_speeds(self) -> np.ndarray:
+        """(P,) m/s."""
+        return np.linalg.norm(self.plan.trajectory(self.path_times, derivative=1), axis=-1)
+
+    @property
+    def top_speed(self) -> float:
+        """m/s, where the scale of colours ends: the limit, or else the fastest there is."""
+        limit = self.plan.problem.limits.speed
+        return limit if limit is not None else float(self.path_speeds.max())
+
+    @cached_property
+    def segments(self) -> np.ndarray:
+        """(P-1, 2, 3) m, the path as lines."""
+        return np.stack([self.path[:-1], self.path[1:]], axis=1).astype(np.float32)
+
+    @cached_property
+    def colours(self) -> np.ndarray:
+        """(P-1, 2, 3) of 0 to 255, by speed."""
+        colours = along_scale(self.path_speeds / self.top_speed)
+        return np.stack([colours[:-1], colours[1:]], axis=1)
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """One entry a leg."""
+        plan = self.plan
+        names = list(plan.report.peaks)
+        segment = np.array([plan.report.peaks[name] for name in names])
+        starts = np.concatenate(([0], np.cumsum(plan.pieces)[:-1]))
+        peaks = np.maximum.reduceat(segment, starts, axis=1)
+        nearest = peaks.argmax(axis=0)
+        points = (len(self.path) - 1) // len(plan.pieces)
+        speeds = self.path_speeds[:-1].reshape(-1, points).max(axis=1)
+        durations = np.diff(plan.waypoint_times)
+        lengths = plan.problem.leg_lengths
+        return tuple(
+            Leg(
+                index,
+                float(durations[index]),
+                float(lengths[index]),
+                float(speeds[index]),
+                ALL_LABELS[names[nearest[index]]],
+                float(peaks[nearest[index], index]),
+            )
+            for index in range(len(durations))
+        )
+
+    @cached_property
+    def curve_times(self) -> np.ndarray:
+        """(CURVE_POINTS,) s from the beginning."""
+        return np.linspace(0.0, self.plan.duration, CURVE_POINTS)
+
+    @cached_property
+    def curves(self) -> tuple[Curve, ...]:
+        """One for each kind that is always shown or limited."""
+        plan, limits = self.plan, self.plan.problem.limits
+        begin = plan.trajectory.start_time
+        times = np.clip(begin + self.curve_times, begin, plan.trajectory.end_time)
+        derivatives = [plan.trajectory(times, order) for order in (1, 2, 3, 4)]
+        values = limited_values(derivatives)
+        curves = []
+        for kind in KINDS:
+            limit = getattr(limits, kind.name)
+            if kind.name in PAIRED or (limit is None and kind.name not in ALWAYS):
+                continue
+            if kind.name == "rotor_thrust":
+                if self.plan.vehicle is None:
+                    continue
+                shown: tuple[np.ndarray, ...] = tuple(planned_states(plan, times).rotor_thrust.T)
+            else:
+                shown = (values[kind.name],)
+            bounds = [limit] + [getattr(limits, low) for low, of in PAIRED.items() if of == kind.name]
+            lines = tuple(float(bound) for bound in bounds if bound is not None)
+            unit = plain_unit(kind.unit)
+            if kind.unit == "rad":
+                shown, unit = tuple(np.degrees(one) for one in shown), "°"
+                lines = tuple(math.degrees(line) for line in lines)
+            title = f"{kind.label[0].upper()}{kind.label[1:]} ({unit})"
+            curves.append(Curve(kind.name, title, shown, lines))
+        return tuple(curves)
+
+    @property
+    def flown(self) -> Vehicle:
+        """What is drawn as flying."""
+        return self.plan.vehicle or STAND_IN
+
+    @cached_property
+    def states(self) -> FlatStates:
+        """What the vehicle does at `path_times`."""
+        if self.plan.vehicle is not None:
+            return planned_states(self.plan, self.path_times)
+        turn = heading(self.plan)
+        return states_along(
+            self.plan.trajectory,
+            self.path_times,
+            STAND_IN,
+            yaw=lambda times: [turn(times, order)[..., 0] for order in (0, 1, 2)],
+        )
+
+    def at(self, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position (3,) m, attitude (4,) as w, x, y, z and rotor thrusts (4,) N at a time, s."""
+        begin = self.plan.trajectory.start_time
+        times, states = self.path_times - begin, self.states
+        seconds = min(max(seconds, 0.0), self.plan.duration)
+        after = int(np.clip(np.searchsorted(times, seconds), 1, len(times) - 1))
+        share = (seconds - times[after - 1]) / (times[after] - times[after - 1])
+        one, other = states.attitude[after - 1], states.attitude[after]
+        attitude = (1.0 - share) * one + share * (other if one @ other >= 0.0 else -other)
+        thrusts = (1.0 - share) * states.rotor_thrust[after - 1] + share * states.rotor_thrust[after]
+        position = self.plan.trajectory(min(begin + seconds, self.plan.trajectory.end_time))
+        return position, attitude / np.linalg.norm(attitude), thrusts

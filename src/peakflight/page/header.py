@@ -1,0 +1,153 @@
+"""What stands on top of the panel: total time, what is proven, what was gained. Plain HTML."""
+
+from dataclasses import dataclass
+from html import escape
+
+from peakflight.page import colours
+from peakflight.page.drawing import Leg
+from peakflight.result import Plan
+
+MOST_ROWS = 250
+"""Legs in the table; the binding ones of more come first."""
+SMALL = f"font-size:12px;line-height:1.45;color:{colours.QUIET}"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Summary:
+    """What the header says."""
+
+    plan: Plan | None
+    """What is drawn; the badge is computed from its report and nothing else."""
+    fresh: bool
+    """Whether that answers the course as it is."""
+    whole: bool
+    """Whether it is the last word; else a draft."""
+    error: str = ""
+    """Why there is no plan of the course as it is."""
+    busy: float | None = None
+    """How long planning has been going on, s."""
+    notice: str = ""
+    """What the planner says meanwhile."""
+    guess: float | None = None
+    """Total time of the paper's initial guess, s."""
+    accepted: float | None = None
+    """Total time of the accepted plan, s."""
+    seconds: float = 0.0
+    """What planning took."""
+
+
+def badge(summary: Summary) -> tuple[str, str, str]:
+    """Word, colour and explanation of what is proven about the plan that is drawn."""
+    plan = summary.plan
+    if plan is None:
+        return ("no plan", colours.BAD, "") if summary.error else ("planning", colours.BUSY, "")
+    if not plan.report.feasible:
+        why = plan.message or "; ".join(plan.report.problems)
+        return "not certified", colours.BAD, why
+    if summary.error or not summary.fresh:
+        return "earlier plan", colours.QUIET, "what is drawn does not answer the course as it is"
+    return "certified", colours.GOOD, "every limit is proven from the coefficients, not sampled"
+
+
+def header(summary: Summary) -> str:
+    """The top of the panel."""
+    plan = summary.plan
+    time = "\u2013" if plan is None else f"{plan.duration:.3f}"
+    word, colour, why = badge(summary)
+    mark = "\u2713 " if word == "certified" else ""
+    lines = [
+        f'<div style="display:flex;align-items:baseline;justify-content:space-between;gap:8px">'
+        f'<div><span data-total style="font-size:38px;font-weight:700;letter-spacing:-0.5px;'
+        f'font-variant-numeric:tabular-nums;color:{colours.INK}">{time}</span>'
+        f'<span style="font-size:16px;color:{colours.QUIET}"> s in all</span></div>'
+        f'<span data-badge title="{escape(why, quote=True)}" style="background:{colour};color:white;'
+        f'border-radius:10px;padding:2px 10px;font-size:12.5px;font-weight:600;white-space:nowrap">'
+        f"{mark}{word}</span></div>",
+    ]
+    if plan is not None:
+        gains = _gain(plan.duration, summary.guess, "the proportional guess")
+        gains += _gain(plan.duration, summary.accepted, "the accepted plan")
+        lines.append(f'<div style="{SMALL}">{"<br>".join(gains) or "&nbsp;"}</div>')
+    lines.append(f'<div data-state style="{SMALL}">{_state(summary)}</div>')
+    if summary.error or (why and word == "not certified"):
+        text = escape(summary.error or why)
+        lines.append(
+            f'<div data-error style="margin-top:4px;padding:6px 8px;border-left:3px solid '
+            f'{colours.BAD};background:#fdf1f0;color:{colours.BAD};font-size:12.5px">{text}</div>'
+        )
+    return f'<div style="padding:2px 12px 4px">{"".join(lines)}</div>'
+
+
+def legs_table(legs: tuple[Leg, ...]) -> str:
+    """Time and nearest limit of each leg, as a table."""
+    shown = legs
+    note = ""
+    if len(legs) > MOST_ROWS:
+        shown = legs[:MOST_ROWS]
+        note = f'<p style="{SMALL}">the first {MOST_ROWS} of {len(legs)} legs</p>'
+    rows = "".join(
+        f'<tr style="border-top:1px solid #edf0f3"><td>{leg.index}</td>'
+        f'<td style="{RIGHT}">{leg.duration:.3f}</td><td style="{RIGHT}">{leg.length:.2f}</td>'
+        f"<td>{_bar(leg)}</td></tr>"
+        for leg in shown
+    )
+    return (
+        f'<div style="padding:0 12px;max-height:330px;overflow-y:auto">'
+        f'<table data-legs style="width:100%;border-collapse:collapse;font-size:12.5px;'
+        f'color:{colours.INK};font-variant-numeric:tabular-nums">'
+        f'<tr style="text-align:left;color:{colours.QUIET}"><th>leg</th>'
+        f'<th style="{RIGHT}">time (s)</th><th style="{RIGHT}">length (m)</th>'
+        f"<th>nearest limit</th></tr>{rows}</table>{note}</div>"
+    )
+
+
+def speed_legend(top: float) -> str:
+    """The scale of colours of the path."""
+    middle = f"{top / 2.0:.3g}"
+    return (
+        f'<div style="padding:2px 12px;font-size:12px;color:{colours.QUIET}">path, by speed (m/s)'
+        f'<div style="height:9px;border-radius:5px;margin:3px 0;background:{colours.gradient()}">'
+        f'</div><div style="display:flex;justify-content:space-between"><span>0</span>'
+        f"<span>{middle}</span><span>{top:.3g}</span></div></div>"
+    )
+
+
+RIGHT = "text-align:right;padding-right:10px"
+
+
+def _gain(duration: float, other: float | None, what: str) -> list[str]:
+    """A line on how much shorter this is."""
+    if other is None:
+        return []
+    part = 100.0 * (duration / other - 1.0)
+    if abs(part) < 0.005:
+        return [f"as long as {what} ({other:.3f} s)"]
+    word, colour = ("shorter", colours.GOOD) if part < 0.0 else ("longer", colours.BAD)
+    return [
+        f'<b style="color:{colour}">{abs(part):.1f} % {word}</b> than {what} ({other:.3f} s)'
+    ]
+
+
+def _state(summary: Summary) -> str:
+    """What is going on, in a line."""
+    if summary.busy is not None:
+        return f"planning, {summary.busy:.1f} s. {escape(summary.notice)}"
+    plan = summary.plan
+    if plan is None:
+        return "&nbsp;"
+    pieces = len(plan.trajectory)
+    kind = "" if summary.whole else "draft: "
+    counted = f"{pieces} polynomial{'' if pieces == 1 else 's'}"
+    return f"{kind}{escape(plan.method)}, {counted}, planned in {1e3 * summary.seconds:.0f} ms"
+
+
+def _bar(leg: Leg) -> str:
+    """How near the nearest limit is, as a bar and a word."""
+    colour = colours.BAD if leg.binds else colours.CURVE
+    word = "reached" if leg.binds else f"{100.0 * leg.ratio:.0f} %"
+    width = min(100.0 * leg.ratio, 100.0)
+    return (
+        f'{escape(leg.limit)} <span style="color:{colour};float:right">{word}</span>'
+        f'<div style="height:3px;background:#e6eaee;border-radius:2px"><div style="height:3px;'
+        f'width:{width:.0f}%;background:{colour};border-radius:2px"></div></div>'
+    )

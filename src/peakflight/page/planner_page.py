@@ -1,0 +1,534 @@
+"""The page: what is edited, what is planned, and what of it is shown. All of it on one thread."""
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import numpy as np
+import viser
+
+from peakflight.errors import PeakflightError
+from peakflight.page import colours, files
+from peakflight.page.asking import Planner, Shown
+from peakflight.page.drawing import Drawing
+from peakflight.page.edited import Edited, nearest_leg, nearest_point
+from peakflight.page.flight_panel import FlightPanel
+from peakflight.page.handles import Handles, Phase
+from peakflight.page.header import Summary
+from peakflight.page.history import History
+from peakflight.page.plan_panel import PlanPanel
+from peakflight.page.scene import Scene
+from peakflight.page.thread import PageThread
+from peakflight.result import Plan
+from peakflight.vehicles import find_vehicle
+from peakflight.yaw import Heading
+
+FRAME = 1.0 / 30.0
+"""Between positions of the vehicle, s."""
+PLOT_FRAME = 1.0 / 12.0
+"""Between positions of the mark in the plots, s."""
+BUSY_AFTER = 0.4
+"""How long planning goes on before the page says so, s."""
+ON_PATH = 0.02
+"""Angle between a click and the path that counts as on it, rad."""
+PAUSE_AT_END = 0.8
+"""Before the flight is played again, s."""
+
+_log = logging.getLogger("peakflight")
+
+
+class Page:
+    """One course for everyone who looks at it."""
+
+    def __init__(self, server: viser.ViserServer, edited: Edited) -> None:
+        self._server = server
+        self._history = History(edited)
+        self._chosen = 0
+        self._drawing: Drawing | None = None
+        self._shown: Shown | None = None
+        self._accepted: Drawing | None = None
+        self._error = self._notice = ""
+        self._views = {"legs": False, "accepted": True, "rings": True}
+        self._adds_by_click = False
+        self._seconds, self._pace, self._playing, self._looked = 0.0, 1.0, False, 0.0
+        self._plotted = 0.0
+        self.latencies: list[float] = []
+        """From an edit to the redrawn path, s, of the last `LATENCIES` plans."""
+        self.thread = PageThread(self._failed)
+        self.planner = Planner(self._planned, self._noticed)
+        self._scene = Scene(server)
+        self._handles = Handles(server, moved=self.move, chose=self.choose)
+        self._panel = PlanPanel(server, self)
+        self._flight = FlightPanel(
+            server, played=self.play, sought=self.seek, paced=self.set_pace, viewed=self.view
+        )
+        server.scene.on_click()(self._clicked(always=False))
+        server.scene.on_click(modifier="cmd/ctrl")(self._clicked(always=True))
+        self._closed = threading.Event()
+        self._clock = threading.Thread(target=self._tick, name="peakflight clock", daemon=True)
+        self._post(lambda: self._begin(edited))
+        self._clock.start()
+
+    @property
+    def edited(self) -> Edited:
+        """What is being edited."""
+        return self._history.present
+
+    @property
+    def drawn(self) -> Plan | None:
+        """The plan that is drawn."""
+        return None if self._drawing is None else self._drawing.plan
+
+    @property
+    def summary(self) -> Summary:
+        """What the header says."""
+        shown, accepted = self._shown, self._accepted
+        busy = self.planner.busy
+        return Summary(
+            plan=self.drawn,
+            fresh=shown is not None and (shown.edited is self.edited or self._history.gesture != ""),
+            whole=shown is not None and shown.whole,
+            error=self._error,
+            busy=busy if busy is not None and busy > BUSY_AFTER else None,
+            notice=self._notice,
+            guess=None if shown is None else shown.guess,
+            accepted=None if accepted is None else accepted.plan.duration,
+            seconds=0.0 if shown is None else shown.seconds,
+        )
+
+    def close(self) -> None:
+        """End threads and processes."""
+        self._closed.set()
+        self._clock.join()
+        self.planner.close()
+        self.thread.close()
+
+    # What a person can do: called from any thread, done on the page's own.
+
+    def undo(self) -> None:
+        """Take the last edit back."""
+        self._post(lambda: self._go(self._history.undo()))
+
+    def redo(self) -> None:
+        """Bring an edit again."""
+        self._post(lambda: self._go(self._history.redo()))
+
+    def accept(self) -> None:
+        """Keep the plan that is drawn, to compare with."""
+        self._post(self._accept)
+
+    def cancel(self) -> None:
+        """Stop planning."""
+        self.planner.cancel()
+        self._post(self._show_header)
+
+    def choose(self, index: int) -> None:
+        """Choose a waypoint."""
+        self._post(lambda: self._choose(index))
+
+    def move(self, index: int, position: np.ndarray, phase: Phase) -> None:
+        """Drag a waypoint."""
+        if phase == "end":
+            self._post(lambda: self._end_move(index, position))
+        else:
+            key = ("move", index) if phase == "update" else None
+            self._post(lambda: self._edit(
+                lambda now: now.move(index, position), f"move {index}", rests=False
+            ), key)
+
+    def place(self, position: tuple[float, float, float]) -> None:
+        """Put the chosen waypoint somewhere."""
+        self._post(lambda: self._edit(lambda now: now.move(self._chosen, position)))
+
+    def turn(self, degrees: float) -> None:
+        """Ask for a yaw at the chosen waypoint."""
+        self._post(lambda: self._edit(lambda now: now.turn(self._chosen, math.radians(degrees))))
+
+    def insert_after(self) -> None:
+        """Add a waypoint after the chosen one."""
+        self._post(self._insert_after)
+
+    def append(self) -> None:
+        """Add a waypoint at the end."""
+        self._post(lambda: self._edit(lambda now: now.append(), choose=-1))
+
+    def delete(self) -> None:
+        """Take the chosen waypoint out."""
+        self._post(lambda: self._edit(lambda now: now.delete(self._chosen)))
+
+    def shift(self, by: int) -> None:
+        """Pass the chosen waypoint earlier or later."""
+        self._post(lambda: self._shift(by))
+
+    def add_by_click(self, on: bool) -> None:
+        """Whether a click adds a waypoint."""
+        self._adds_by_click = on
+
+    def fly(self, name: str | None) -> None:
+        """Let another vehicle fly."""
+        self._post(lambda: self._edit(lambda now: now.fly(None if name is None else _known(now, name))))
+
+    def rotors_alone(self) -> None:
+        """Limit the vehicle's rotors themselves."""
+        self._post(lambda: self._edit(
+            lambda now: now if now.vehicle is None else now.fly(now.vehicle.on_rotors())
+        ))
+
+    def limit(self, name: str, value: float | None, moving: bool) -> None:
+        """Set a limit, in SI units, or lift it."""
+        gesture = f"limit {name}" if moving else ""
+        self._post(
+            lambda: self._edit(lambda now: now.limit({name: value}), gesture, rests=not moving),
+            key=gesture or None,
+        )
+
+    def plan_by(self, **changes: Any) -> None:
+        """Plan in another way."""
+        self._post(lambda: self._edit(lambda now: now.plan_by(**changes)))
+
+    def head(self, policy: str, degrees: float, point: tuple[float, ...]) -> None:
+        """Ask for another yaw."""
+        self._post(lambda: self._edit(lambda now: now.head(_heading(now, policy, degrees, point))))
+
+    def play(self, on: bool) -> None:
+        """Fly, or stop."""
+        self._post(lambda: self._play(on))
+
+    def seek(self, seconds: float) -> None:
+        """Look at another time, s."""
+        self._post(lambda: self._seek(seconds), key="seek")
+
+    def set_pace(self, pace: float) -> None:
+        """Play faster or slower than it is."""
+        self._pace = pace
+
+    def view(self, name: str, on: bool) -> None:
+        """Show something, or not."""
+        self._post(lambda: self._view(name, on))
+
+    def load(self, name: str, content: bytes, client: Any) -> None:
+        """Edit what was uploaded."""
+        self._post(lambda: self._load(name, content, client))
+
+    def save(self, what: str, client: Any) -> None:
+        """Send a file to whoever asked for it; flight files take a while, so they have a thread."""
+        plan, edited, fresh = self.drawn, self.edited, self.summary.fresh
+        deed = _Saving(self, what, plan if fresh else None, edited, client)
+        threading.Thread(target=deed.run, name="peakflight file", daemon=True).start()
+
+    def say(self, text: str, *, good: bool, client: Any = None) -> None:
+        """Show what became of a file, to everyone, and to whoever asked as a notification."""
+        colour = colours.GOOD if good else colours.BAD
+        html = (
+            f'<div data-file style="margin:2px 12px;padding:6px 8px;border-left:3px solid {colour};'
+            f'color:{colour};font-size:12.5px;overflow-wrap:anywhere">{escape(text)}</div>'
+        )
+        self._post(lambda: self._panel.say(html))
+        if client is not None and not good:
+            client.add_notification("Refused", text, color="red", auto_close_seconds=12.0)
+
+    # What is done, on the page's own thread.
+
+    def _post(self, deed: Callable[[], None], key: object = None) -> None:
+        self.thread.post(deed, key)
+
+    def _begin(self, edited: Edited) -> None:
+        """Show a course that was not there before."""
+        self._history, self._chosen = History(edited), min(1, len(edited.waypoints) - 1)
+        self._accepted = None
+        self._panel.show_ground(self._scene.set_ground(edited.waypoints))
+        self._handles.show(edited.waypoints, self._chosen, resize=True)
+        self._panel.show_edited(edited, self._chosen)
+        self._show_header()
+        self.planner.ask(edited)
+
+    def _edit(
+        self,
+        change: Callable[[Edited], Edited],
+        gesture: str = "",
+        *,
+        rests: bool = True,
+        choose: int | None = None,
+    ) -> None:
+        """Go on to a changed course, or say why not."""
+        try:
+            edited = change(self.edited)
+        except PeakflightError as error:
+            self._error = str(error)
+            self._panel.show_edited(self.edited, self._chosen)
+            self._show_header()
+            return
+        if edited is self.edited:
+            return
+        if choose is not None:
+            self._chosen = choose % len(edited.waypoints)
+        self._go(self._history.do(edited, gesture), rests=rests)
+
+    def _go(self, history: History, *, rests: bool = True) -> None:
+        """Show another state, and have it planned."""
+        if history.present is self.edited:
+            self._history = history
+            return
+        self._history, self._error = history, ""
+        edited = history.present
+        self._chosen = min(self._chosen, len(edited.waypoints) - 1)
+        self._handles.show(edited.waypoints, self._chosen)
+        if rests:
+            self._panel.show_edited(edited, self._chosen)
+        else:
+            self._panel.show_chosen(edited, self._chosen)
+        self.planner.ask(edited, rests=rests)
+
+    def _end_move(self, index: int, position: np.ndarray) -> None:
+        """A waypoint is let go."""
+        self._edit(lambda now: now.move(index, position), f"move {index}", rests=False)
+        self._history = self._history.rest()
+        self.planner.rest()
+        self._panel.show_edited(self.edited, self._chosen)
+        self._handles.show(self.edited.waypoints, self._chosen, resize=True)
+
+    def _choose(self, index: int) -> None:
+        if 0 <= index < len(self.edited.waypoints) and index != self._chosen:
+            self._chosen = index
+            self._handles.show(self.edited.waypoints, index)
+            self._panel.show_chosen(self.edited, index)
+
+    def _insert_after(self) -> None:
+        """Add a waypoint in the middle of the next leg, on the path if there is one."""
+        index = self._chosen
+        if index == len(self.edited.waypoints) - 1:
+            self._edit(lambda now: now.append(), choose=-1)
+            return
+        middle = self.edited.waypoints[index : index + 2].mean(axis=0)
+        plan = self.drawn
+        if plan is not None and len(plan.pieces) == len(self.edited.waypoints) - 1:
+            middle = plan.trajectory(plan.waypoint_times[index : index + 2].mean())
+        self._edit(lambda now: now.insert(index + 1, middle), choose=index + 1)
+
+    def _shift(self, by: int) -> None:
+        to = self._chosen + by
+        if 0 <= to < len(self.edited.waypoints):
+            self._edit(lambda now: now.reorder(self._chosen, to), choose=to)
+
+    def _clicked(self, *, always: bool) -> Callable[[Any], Any]:
+        async def callback(event: Any) -> None:
+            if always or self._adds_by_click:
+                origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+                self._post(lambda: self._add(origin, direction))
+
+        return callback
+
+    def _add(self, origin: np.ndarray, direction: np.ndarray) -> None:
+        """Add a waypoint where a line of sight meets the path, or else at the end."""
+        edited, drawing = self.edited, self._drawing
+        if drawing is not None and len(drawing.plan.pieces) == len(edited.waypoints) - 1:
+            index, angle = nearest_point(drawing.path, origin, direction)
+            if angle < ON_PATH:
+                leg = index // ((len(drawing.path) - 1) // len(drawing.plan.pieces))
+                leg = min(leg, len(edited.waypoints) - 2)
+                self._edit(lambda now: now.insert(leg + 1, drawing.path[index]), choose=leg + 1)
+                return
+        height = edited.waypoints[-1, 2]
+        along = (height - origin[2]) / direction[2] if direction[2] else -1.0
+        if along > 0.0:
+            place = origin + along * direction
+            self._edit(lambda now: now.insert(len(now.waypoints), place), choose=-1)
+            return
+        leg = nearest_leg(edited.waypoints, origin, direction)
+        middle = edited.waypoints[leg : leg + 2].mean(axis=0)
+        self._edit(lambda now: now.insert(leg + 1, middle), choose=leg + 1)
+
+    def _accept(self) -> None:
+        if self._drawing is None or not self._drawing.plan.report.feasible:
+            return
+        self._accepted = self._drawing
+        self._scene.draw_ghost(self._accepted, visible=self._views["accepted"])
+        self._show_header()
+
+    def _view(self, name: str, on: bool) -> None:
+        self._views[name] = on
+        if name == "rings":
+            self._handles.show_rings(on)
+        elif name == "accepted":
+            self._scene.draw_ghost(self._accepted, visible=on)
+        else:
+            self._scene.label_legs(self._drawing if on else None)
+
+    def _load(self, name: str, content: bytes, client: Any) -> None:
+        try:
+            edited, notes = files.load_upload(name, content, self.edited)
+        except PeakflightError as error:
+            self.say(str(error), good=False, client=client)
+            return
+        self._error = ""
+        self._drawing = self._shown = None
+        self._scene.draw_ghost(None, visible=False)
+        self._begin(edited)
+        count = len(edited.waypoints)
+        self.say("; ".join((f"{name}: {count} waypoints", *notes)), good=True)
+
+    # What the planner and the clock bring.
+
+    def _planned(self, shown: Shown) -> None:
+        self._post(lambda: self._draw(shown), key="draw")
+
+    def _noticed(self, text: str) -> None:
+        self._notice = text
+        self._post(self._show_header, key="header")
+
+    def _draw(self, shown: Shown) -> None:
+        """Show a plan, if it is about what is edited or on the way there."""
+        if shown.whole and shown.edited is not self.edited:
+            return  # of a course that has gone on since
+        self._notice = ""
+        guess = shown.guess
+        if guess is None and self._shown is not None and not shown.whole:
+            guess = self._shown.guess
+        self._shown = Shown(**{**shown.__dict__, "guess": guess})
+        if shown.plan is None:
+            self._error = shown.error
+            if self._drawing is not None:
+                self._scene.draw_path(self._drawing, fresh=False)
+            self._show_header()
+            return
+        self._error = ""
+        self._drawing = drawing = Drawing(shown.plan)
+        self._scene.draw_path(drawing)
+        self._show_header()
+        self._server.flush()
+        self._took(time.perf_counter() - shown.asked_at)
+        self._scene.set_vehicle(drawing)
+        self._seconds = min(self._seconds, shown.plan.duration)
+        self._scene.move_vehicle(drawing, self._seconds)
+        self._flight.show(drawing)
+        self._flight.plot(drawing, self._seconds)
+        if shown.whole:
+            self._panel.show_legs(drawing)
+        if self._views["legs"]:
+            self._scene.label_legs(drawing)
+
+    def _took(self, seconds: float) -> None:
+        self.latencies.append(seconds)
+        del self.latencies[:-LATENCIES]
+
+    def _show_header(self) -> None:
+        self._panel.show_header(self.summary)
+
+    def _play(self, on: bool) -> None:
+        if self._drawing is not None and on and self._seconds >= self._drawing.plan.duration:
+            self._seconds = 0.0
+        self._playing, self._looked = on, time.perf_counter()
+        self._flight.set_playing(on)
+
+    def _seek(self, seconds: float) -> None:
+        self._seconds = seconds
+        if self._drawing is not None:
+            self._scene.move_vehicle(self._drawing, seconds)
+            self._flight.plot(self._drawing, seconds)
+
+    def _tick(self) -> None:
+        """Wake the page while there is something that moves."""
+        said = False
+        while not self._closed.wait(FRAME):
+            if self._playing and self._server.get_clients():
+                self._post(self._advance, key="advance")
+            busy = self.planner.busy
+            if (busy is not None and busy > BUSY_AFTER) or said:
+                said = busy is not None and busy > BUSY_AFTER
+                self._post(self._show_header, key="header")
+
+    def _advance(self) -> None:
+        """Fly on by a frame."""
+        now = time.perf_counter()
+        passed, self._looked = now - self._looked, now
+        drawing = self._drawing
+        if drawing is None or not self._playing:
+            return
+        self._seconds += self._pace * passed
+        if self._seconds > drawing.plan.duration + PAUSE_AT_END * self._pace:
+            self._seconds = 0.0
+        seconds = min(self._seconds, drawing.plan.duration)
+        self._scene.move_vehicle(drawing, seconds)
+        if now - self._plotted > PLOT_FRAME:
+            self._plotted = now
+            self._flight.set_time(seconds)
+            self._flight.plot(drawing, seconds)
+
+    def _failed(self, error: Exception) -> None:
+        self._error = f"unexpected {type(error).__name__}: {error}; this is a bug in the page"
+
+
+LATENCIES = 2000
+
+
+class _Saving:
+    """Making one file for one person."""
+
+    def __init__(
+        self, page: Page, what: str, plan: Plan | None, edited: Edited, client: Any
+    ) -> None:
+        self._page, self._what, self._plan = page, what, plan
+        self._edited, self._client = edited, client
+
+    def run(self) -> None:
+        """Make it and send it, or say why not."""
+        try:
+            name, content, said = self._made()
+        except PeakflightError as error:
+            self._page.say(str(error), good=False, client=self._client)
+            return
+        except Exception as error:  # a bug must be seen on the page, too
+            _log.exception("a file could not be made")
+            text = f"unexpected {type(error).__name__}: {error}; this is a bug"
+            self._page.say(text, good=False, client=self._client)
+            return
+        if self._client is not None:
+            self._client.send_file_download(name, content, save_immediately=True)
+        self._page.say(said, good=True)
+
+    def _made(self) -> tuple[str, bytes, str]:
+        """Name, content, and what is said about it."""
+        stem = self._edited.name
+        if self._what == "course":
+            return f"{stem}.csv", files.course_csv(self._edited), f"saved {stem}.csv"
+        if self._plan is None:
+            raise PeakflightError("there is no plan of the course as it is yet")
+        if self._what == "plan":
+            said = "saved plan.json" if self._plan.report.feasible else (
+                "saved plan.json, which is not proven to keep the limits"
+            )
+            return "plan.json", files.plan_json(self._plan), said
+        to = self._what.partition(":")[2]
+        name, content, report = files.flight_file(self._plan, to)
+        if not report.feasible:
+            raise PeakflightError(f"{name}: not proven to keep the limits: {report.problems[0]}")
+        notes = "; ".join(("proven again as it is read", *report.notes))
+        return name, content, f"exported {name}: {notes}"
+
+
+def _known(now: Edited, name: str) -> Any:
+    """A vehicle by its name: a preset, or the user's own that is edited with."""
+    if now.vehicle is not None and now.vehicle.name == name:
+        return now.vehicle
+    return find_vehicle(name)
+
+
+def _heading(
+    now: Edited, policy: str, degrees: float, point: tuple[float, ...]
+) -> Heading | np.ndarray | None:
+    """What is asked of the yaw."""
+    if not policy:
+        return None
+    if policy == "waypoints":
+        angles = now.angles
+        return np.zeros(len(now.waypoints)) if angles is None else angles
+    if policy == "fixed":
+        return Heading(policy=policy, angle=math.radians(degrees))
+    if policy == "point":
+        x, y, z = point
+        return Heading(policy=policy, point=(x, y, z))
+    return Heading(policy=policy)

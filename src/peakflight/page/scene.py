@@ -1,0 +1,179 @@
+"""What a plan looks like in space: ground, path, the accepted one beside it, legs, the vehicle."""
+
+from typing import Any
+
+import numpy as np
+import viser
+
+from peakflight.limits import GRAVITY
+from peakflight.page import colours, shapes
+from peakflight.page.drawing import Drawing, Leg
+from peakflight.result import Plan
+
+PATH_WIDTH, GHOST_WIDTH = 5.0, 2.5
+"""Pixels."""
+CELL_CHOICES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+"""Sizes of a cell of the ground, m."""
+CELLS = 24
+"""Of them across a course, at most."""
+SECTION = 5
+"""Cells between stronger lines."""
+SEEN = 0.022
+"""Size of the vehicle over that of the course, at least, so that it can be seen."""
+ARROW = 1.1
+"""Length of a rotor's arrow as it hovers, over the vehicle's size."""
+MOST_LEG_LABELS = 80
+"""Legs that are labelled; of more, every so many."""
+LABEL = 0.8
+"""Size of labels."""
+
+
+class Scene:
+    """The nodes of the scene that a plan says; handles are elsewhere."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._path: viser.LineSegmentsHandle | None = None
+        self._ghost: viser.LineSegmentsHandle | None = None
+        self._labels: list[viser.LabelHandle] = []
+        self._vehicle: Any = None
+        self._arrows: viser.ArrowsHandle | None = None
+        self._vehicle_key: tuple[Any, ...] = ()
+        self._size = 1.0
+        server.scene.set_up_direction("+z")
+        server.scene.world_axes.visible = False
+
+    def set_ground(self, waypoints: np.ndarray) -> str:
+        """Draw the ground at z = 0 below a course, and look at it; returns what a cell is."""
+        low, high = waypoints.min(axis=0), waypoints.max(axis=0)
+        centre, extent = (low + high) / 2.0, size_of(waypoints)
+        cell = next((size for size in CELL_CHOICES if extent / size <= CELLS), CELL_CHOICES[-1])
+        across = 3.0 * extent
+        self._server.scene.add_grid(
+            "/ground",
+            width=across,
+            height=across,
+            cell_size=cell,
+            section_size=SECTION * cell,
+            cell_color=(222, 226, 231),
+            section_color=(190, 197, 206),
+            cell_thickness=1.0,
+            section_thickness=1.3,
+            plane_opacity=0.0,
+            shadow_opacity=0.0,
+            position=(*np.round(centre[:2] / (SECTION * cell)) * SECTION * cell, 0.0),
+        )
+        self._server.scene.add_frame(
+            "/axes", axes_length=1.5 * cell, axes_radius=0.03 * cell, origin_radius=0.06 * cell
+        )
+        camera = self._server.initial_camera
+        target = np.array([*centre[:2], 0.6 * centre[2]])
+        camera.look_at = tuple(target)
+        camera.position = tuple(target + extent * np.array([-0.35, -1.0, 0.8]))
+        return f"grid at z = 0: cells of {cell:g} m, strong lines every {SECTION * cell:g} m"
+
+    def draw_path(self, drawing: Drawing, *, fresh: bool = True) -> None:
+        """Draw the path of a plan; by speed if it is proven and of the course, else in one colour."""
+        shown = drawing.colours
+        if not drawing.plan.report.feasible:
+            shown = np.broadcast_to(np.array(colours.REFUSED, dtype=np.uint8), shown.shape)
+        elif not fresh:
+            shown = np.broadcast_to(np.array(colours.GHOST, dtype=np.uint8), shown.shape)
+        self._path = self._lines("/path", self._path, drawing.segments, shown, PATH_WIDTH)
+
+    def draw_ghost(self, drawing: Drawing | None, *, visible: bool) -> None:
+        """Draw the accepted path, or take it away."""
+        if drawing is None or not visible:
+            if self._ghost is not None:
+                self._ghost.visible = False
+            return
+        grey = np.broadcast_to(np.array(colours.GHOST, dtype=np.uint8), drawing.segments.shape)
+        self._ghost = self._lines("/accepted", self._ghost, drawing.segments, grey, GHOST_WIDTH)
+        self._ghost.visible = True
+
+    def label_legs(self, drawing: Drawing | None) -> None:
+        """Write time and nearest limit beside each leg; None takes the labels away."""
+        texts, places = [], np.empty((0, 3))
+        if drawing is not None:
+            every = -(-len(drawing.legs) // MOST_LEG_LABELS)
+            legs = drawing.legs[::every]
+            texts = [leg_text(leg) for leg in legs]
+            times = drawing.plan.waypoint_times
+            middles = (times[:-1] + times[1:])[::every] / 2.0
+            places = drawing.plan.trajectory(middles)
+        for label in self._labels[len(texts) :]:
+            label.remove()
+        del self._labels[len(texts) :]
+        for index, (text, place) in enumerate(zip(texts, places, strict=True)):
+            if index < len(self._labels):
+                self._labels[index].text, self._labels[index].position = text, place
+                continue
+            label = self._server.scene.add_label(
+                f"/legs/{index}", text, position=place, font_screen_scale=LABEL,
+                anchor="center-center",
+            )
+            self._labels.append(label)
+
+    def set_vehicle(self, drawing: Drawing) -> None:
+        """Draw what flies, if it is another one than before."""
+        vehicle = drawing.flown
+        key = (vehicle.rotor_positions, round(size_of(drawing.plan.problem.waypoints), 1))
+        if key == self._vehicle_key:
+            return
+        self._vehicle_key = key
+        mesh, size = shapes.quadrotor(np.array(vehicle.rotor_positions))
+        scale = max(1.0, SEEN * size_of(drawing.plan.problem.waypoints) / size)
+        self._size = scale * size
+        self._vehicle = self._server.scene.add_frame("/vehicle", show_axes=False)
+        self._server.scene.add_mesh_trimesh("/vehicle/body", mesh, scale=scale)
+        self._rotors = scale * np.pad(np.array(vehicle.rotor_positions), ((0, 0), (0, 1)))
+        self._arrows = self._server.scene.add_arrows(
+            "/vehicle/thrusts",
+            self._arrow_points(np.full(4, vehicle.mass * GRAVITY / 4.0), drawing.plan),
+            colors=colours.THRUST,
+            shaft_radius=0.045 * self._size,
+            head_radius=0.12 * self._size,
+            head_length=0.25 * self._size,
+        )
+
+    def move_vehicle(self, drawing: Drawing, seconds: float) -> None:
+        """Put the vehicle where it is at a time, s, as it leans there, with its rotors' thrusts."""
+        if self._vehicle is None or self._arrows is None:
+            return
+        position, attitude, thrusts = drawing.at(seconds)
+        self._vehicle.position, self._vehicle.wxyz = position, attitude
+        self._arrows.points = self._arrow_points(thrusts, drawing.plan)
+
+    def _arrow_points(self, thrusts: np.ndarray, plan: Plan) -> np.ndarray:
+        """(4, 2, 3) m in the body frame; as long as the thrust is, over that of hovering."""
+        vehicle = Drawing(plan).flown
+        lengths = ARROW * self._size * thrusts / (vehicle.mass * GRAVITY / 4.0)
+        ends = self._rotors + np.maximum(lengths, 1e-3)[:, None] * np.array([0.0, 0.0, 1.0])
+        return np.stack([self._rotors, ends], axis=1).astype(np.float32)
+
+    def _lines(
+        self,
+        name: str,
+        lines: viser.LineSegmentsHandle | None,
+        points: np.ndarray,
+        shown: np.ndarray,
+        width: float,
+    ) -> viser.LineSegmentsHandle:
+        """Lines with other points: the same node as long as there are as many."""
+        if lines is None or lines.points.shape != points.shape:
+            return self._server.scene.add_line_segments(
+                name, points, shown, thickness=width, thickness_units="screen"
+            )
+        with self._server.atomic():
+            lines.points, lines.colors = points, shown
+        return lines
+
+
+def size_of(waypoints: np.ndarray) -> float:
+    """How large a course is, m: its diagonal, and never nothing."""
+    return max(float(np.linalg.norm(np.ptp(waypoints, axis=0))), 0.5)
+
+
+def leg_text(leg: Leg) -> str:
+    """What a leg's label says."""
+    return f"{leg.duration:.2f} s \u00b7 {leg.limit}"

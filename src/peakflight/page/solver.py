@@ -1,0 +1,113 @@
+"""The process that plans for the page: requests in, answers out, until there are no more.
+
+It is a process of its own so that a long solve can be stopped at once, and so that it never holds
+up the server. Requests and answers are pickled, one after the other, through its standard input
+and output; whatever prints goes to the standard error.
+"""
+
+import logging
+import os
+import pickle
+import signal
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+from peakflight.errors import PeakflightError
+from peakflight.problem import Problem
+from peakflight.result import Plan
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Request:
+    """What to plan."""
+
+    number: int
+    problem: Problem
+    method: str
+    options: dict[str, Any] = field(default_factory=dict)
+    """Of the method."""
+    guess: bool = False
+    """Whether the paper's initial guess is planned too, to compare with."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Answer:
+    """What came of a request."""
+
+    number: int
+    plan: Plan | None = None
+    error: str = ""
+    """Why there is no plan."""
+    guess: float | None = None
+    """Total time of the initial guess, s, if it was asked for and keeps the limits."""
+    seconds: float = 0.0
+    """What it took."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A line on what is going on, such as compiling."""
+
+    text: str
+
+
+def main() -> None:
+    """Answer requests until the input ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    logging.getLogger("peakflight").addHandler(_Noticing(replies))
+    requests = sys.stdin.buffer
+    while True:
+        try:
+            request = pickle.load(requests)
+        except EOFError:
+            return
+        try:
+            _send(replies, answer(request))
+        except BrokenPipeError:
+            return
+
+
+def answer(request: Request) -> Answer:
+    """Plan, and whatever goes wrong, say so."""
+    from peakflight.planner import plan
+
+    began = time.perf_counter()
+    try:
+        found = plan(request.problem, method=request.method, **request.options)
+        guess = None
+        if request.guess:
+            first = plan(request.problem, method="proportional")
+            guess = first.duration if first.feasible else None
+    except PeakflightError as error:
+        return Answer(number=request.number, error=str(error))
+    except Exception as error:  # a bug there must not end the page
+        text = f"unexpected {type(error).__name__}: {error}; this is a bug"
+        return Answer(number=request.number, error=text)
+    seconds = time.perf_counter() - began
+    return Answer(number=request.number, plan=found, guess=guess, seconds=seconds)
+
+
+class _Noticing(logging.Handler):
+    """Passes on what the planner logs."""
+
+    def __init__(self, replies: BinaryIO) -> None:
+        super().__init__()
+        self._replies = replies
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _send(self._replies, Notice(record.getMessage()))
+
+
+def _send(replies: BinaryIO, value: Answer | Notice) -> None:
+    pickle.dump(value, replies, protocol=pickle.HIGHEST_PROTOCOL)
+    replies.flush()
+
+
+if __name__ == "__main__":
+    from peakflight.page import solver  # so that what is pickled is of a module, not of __main__
+
+    solver.main()
