@@ -53,3 +53,31 @@ def gradient() -> str:
     """The scale as CSS, from left to right."""
     stops = ", ".join(f"rgb({red},{green},{blue})" for red, green, blue in SCALE)
     return f"linear-gradient(90deg, {stops})"
+
+
+def for_lines(shown: np.ndarray) -> np.ndarray:
+    """What to give lines, (..., 3) of 0 to 255, so that they look like this.
+
+    viser takes the colours of lines for linear light and draws that through a film curve (the fit
+    of ACES by S. Hill that three.js has), which pales them; this undoes both, as far as it goes.
+    """
+    share = np.asarray(shown, dtype=float) / 255.0
+    light = np.where(share < 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    curve = np.clip(light @ np.linalg.inv(FILM_OUT).T, 0.0, FILM_TOP)
+    a = 1.0 - FILM_C * curve
+    b = FILM_A - FILM_D * curve
+    c = -(FILM_B + FILM_E * curve)
+    before = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    given = FILM_EXPOSURE * before @ np.linalg.inv(FILM_IN).T
+    return np.rint(255.0 * np.clip(given, 0.0, 1.0)).astype(np.uint8)
+
+
+FILM_IN = np.array(
+    [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]]
+)
+FILM_OUT = np.array(
+    [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]]
+)
+FILM_A, FILM_B, FILM_C, FILM_D, FILM_E = 0.0245786, 0.000090537, 0.983729, 0.4329510, 0.238081
+FILM_EXPOSURE, FILM_TOP = 0.6, 0.95
+"""Of the film curve; no light comes out brighter than its top."""

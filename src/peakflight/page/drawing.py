@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,8 @@ MOST_POINTS, LEAST_A_LEG, MOST_A_LEG = 2400, 10, 60
 """Of the path: enough to look smooth, few enough to be sent in a frame."""
 CURVE_POINTS = 361
 """Of each plot: about one a pixel."""
+AT_LIMIT = 0.995
+"""Of a limit, from where on it counts as flown at."""
 ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
 """Plots that are always there, limited or not."""
 PAIRED = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
@@ -40,6 +43,22 @@ class Curve:
     """None, one or two, in the unit of the values."""
 
 
+class Held(NamedTuple):
+    """What one limit does on one leg."""
+
+    label: str
+    """What it is called."""
+    ratio: float
+    """Certified: the peak over the limit."""
+    share: float
+    """Part of the leg's time that is flown at the limit, sampled."""
+
+    @property
+    def binds(self) -> bool:
+        """Whether the limit is reached, within 0.1 %."""
+        return self.ratio >= BINDING
+
+
 @dataclass(frozen=True)
 class Leg:
     """What one leg is like."""
@@ -49,17 +68,8 @@ class Leg:
     """s."""
     length: float
     """m, straight."""
-    peak_speed: float
-    """m/s, sampled, for orientation."""
-    limit: str
-    """What it is called that comes nearest to its limit."""
-    ratio: float
-    """Certified: the peak of that over its limit."""
-
-    @property
-    def binds(self) -> bool:
-        """Whether that limit is reached, within 0.1 %."""
-        return self.ratio >= BINDING
+    held: tuple[Held, ...]
+    """By each limit: first what holds it back the longest, then what comes nearest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,22 +123,32 @@ class Drawing:
         segment = np.array([plan.report.peaks[name] for name in names])
         starts = np.concatenate(([0], np.cumsum(plan.pieces)[:-1]))
         peaks = np.maximum.reduceat(segment, starts, axis=1)
-        nearest = peaks.argmax(axis=0)
-        points = (len(self.path) - 1) // len(plan.pieces)
-        speeds = self.path_speeds[:-1].reshape(-1, points).max(axis=1)
-        durations = np.diff(plan.waypoint_times)
-        lengths = plan.problem.leg_lengths
-        return tuple(
-            Leg(
-                index,
-                float(durations[index]),
-                float(lengths[index]),
-                float(speeds[index]),
-                ALL_LABELS[names[nearest[index]]],
-                float(peaks[nearest[index], index]),
-            )
-            for index in range(len(durations))
-        )
+        shares = [self._shares(name) for name in names]
+        durations, lengths = np.diff(plan.waypoint_times), plan.problem.leg_lengths
+        legs = []
+        for leg in range(len(durations)):
+            held = [
+                Held(ALL_LABELS[name], float(peaks[row, leg]), float(shares[row][leg]))
+                for row, name in enumerate(names)
+            ]
+            held.sort(key=lambda one: (one.binds, one.share, one.ratio), reverse=True)
+            legs.append(Leg(leg, float(durations[leg]), float(lengths[leg]), tuple(held)))
+        return tuple(legs)
+
+    @cached_property
+    def _ratios(self) -> dict[str, np.ndarray]:
+        """Name of limit to (P,) values over it, at `path_times`."""
+        limits = self.plan.problem.limits
+        derivatives = [self.plan.trajectory(self.path_times, order) for order in (1, 2, 3, 4)]
+        return limits.ratios(limited_values(derivatives, limits.airframe))
+
+    def _shares(self, name: str) -> np.ndarray:
+        """(legs,) part of each leg's time at a limit; 0 for limits of the yaw."""
+        legs = len(self.plan.pieces)
+        ratios = self._ratios.get(name)
+        if ratios is None:
+            return np.zeros(legs)
+        return (ratios[:-1].reshape(legs, -1) >= AT_LIMIT).mean(axis=1)
 
     @cached_property
     def curve_times(self) -> np.ndarray:

@@ -13,9 +13,8 @@ import viser
 from peakflight.page import colours, shapes
 from peakflight.page.scene import size_of
 
-BALL, BALL_OF_LEG = 0.013, 0.22
+BALL, BALL_OF_LEG = 0.016, 0.22
 """Radius of a ball over the size of the course, and at most over a typical leg."""
-GRAB = 1.0
 RING = 2.6
 """Radius of a ring over that of a ball."""
 MOST_NUMBERS = 60
@@ -86,7 +85,7 @@ class Handles:
         upright = np.tile(np.array([1.0, 0.0, 0.0, 0.0], dtype=np.float32), (len(positions), 1))
         self._balls = self._server.scene.add_batched_meshes_simple(
             "/waypoints",
-            GRAB * self._radius * vertices,
+            self._radius * vertices,
             faces,
             batched_wxyzs=upright,
             batched_positions=positions,

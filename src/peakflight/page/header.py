@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from html import escape
 
 from peakflight.page import colours
-from peakflight.page.drawing import Leg
+from peakflight.page.drawing import Held, Leg
 from peakflight.result import Plan
 
 MOST_ROWS = 250
@@ -59,7 +59,7 @@ def header(summary: Summary) -> str:
         f'<div style="display:flex;align-items:baseline;justify-content:space-between;gap:8px">'
         f'<div><span data-total style="font-size:38px;font-weight:700;letter-spacing:-0.5px;'
         f'font-variant-numeric:tabular-nums;color:{colours.INK}">{time}</span>'
-        f'<span style="font-size:16px;color:{colours.QUIET}"> s in all</span></div>'
+        f'<span style="font-size:16px;color:{colours.QUIET}"> s total</span></div>'
         f'<span data-badge title="{escape(why, quote=True)}" style="background:{colour};color:white;'
         f'border-radius:10px;padding:2px 10px;font-size:12.5px;font-weight:600;white-space:nowrap">'
         f"{mark}{word}</span></div>",
@@ -88,7 +88,7 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
     rows = "".join(
         f'<tr style="border-top:1px solid #edf0f3"><td>{leg.index}</td>'
         f'<td style="{RIGHT}">{leg.duration:.3f}</td><td style="{RIGHT}">{leg.length:.2f}</td>'
-        f"<td>{_bar(leg)}</td></tr>"
+        f"<td>{_held(leg)}</td></tr>"
         for leg in shown
     )
     return (
@@ -97,7 +97,7 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
         f'color:{colours.INK};font-variant-numeric:tabular-nums">'
         f'<tr style="text-align:left;color:{colours.QUIET}"><th>leg</th>'
         f'<th style="{RIGHT}">time (s)</th><th style="{RIGHT}">length (m)</th>'
-        f"<th>nearest limit</th></tr>{rows}</table>{note}</div>"
+        f"<th>held back by</th></tr>{rows}</table>{note}</div>"
     )
 
 
@@ -141,13 +141,23 @@ def _state(summary: Summary) -> str:
     return f"{kind}{escape(plan.method)}, {counted}, planned in {1e3 * summary.seconds:.0f} ms"
 
 
-def _bar(leg: Leg) -> str:
-    """How near the nearest limit is, as a bar and a word."""
-    colour = colours.BAD if leg.binds else colours.CURVE
-    word = "reached" if leg.binds else f"{100.0 * leg.ratio:.0f} %"
-    width = min(100.0 * leg.ratio, 100.0)
-    return (
-        f'{escape(leg.limit)} <span style="color:{colour};float:right">{word}</span>'
-        f'<div style="height:3px;background:#e6eaee;border-radius:2px"><div style="height:3px;'
-        f'width:{width:.0f}%;background:{colour};border-radius:2px"></div></div>'
-    )
+def _held(leg: Leg) -> str:
+    """Which limits are reached, each with the part of the time; or which comes nearest."""
+    reached = [one for one in leg.held if one.binds]
+    if not reached:
+        nearest = leg.held[0]
+        return (
+            f'<span style="color:{colours.QUIET}">{escape(nearest.label)}, '
+            f"{100.0 * nearest.ratio:.0f} % of it</span>"
+        )
+    first, *others = reached
+    text = f"<b>{escape(first.label)}</b> {_share(first)}"
+    if others:
+        names = ", ".join(f"{escape(one.label)} {_share(one)}" for one in others)
+        text += f'<div style="font-size:11.5px;color:{colours.QUIET}">{names}</div>'
+    return text
+
+
+def _share(one: Held) -> str:
+    """Part of the time that a limit is flown at."""
+    return f"{100.0 * one.share:.0f} %" if one.share >= 0.005 else "for a moment"

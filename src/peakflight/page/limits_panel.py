@@ -24,19 +24,19 @@ class Range:
 
 
 RANGES = {
-    "speed": Range(0.2, 25.0, 0.1, 5.0, "Fastest that the drone may go."),
+    "speed": Range(0.2, 25.0, 0.01, 5.0, "Fastest that the drone may go."),
     "thrust_acceleration": Range(
-        10.0, 50.0, 0.1, 15.5, "Thrust over mass: 9.81 hovers, more is what is left to turn with."
+        10.0, 50.0, 0.01, 15.5, "Thrust over mass: 9.81 hovers, more is what is left to turn with."
     ),
-    "jerk": Range(5.0, 1000.0, 1.0, 62.0, "How fast acceleration may change: soft or snappy."),
-    "snap": Range(50.0, 20000.0, 10.0, 800.0, "How fast jerk may change: what motors must follow."),
+    "jerk": Range(5.0, 300.0, 1.0, 62.0, "How fast acceleration may change: soft or snappy."),
+    "snap": Range(50.0, 4000.0, 10.0, 800.0, "How fast jerk may change: what motors must follow."),
     "tilt": Range(5.0, 85.0, 1.0, 50.0, "Largest angle of the thrust from the vertical."),
     "least_thrust_acceleration": Range(
-        0.1, 9.7, 0.1, 2.0, "Smallest thrust over mass: keeps rotors from stopping."
+        0.1, 9.7, 0.01, 2.0, "Smallest thrust over mass: keeps rotors from stopping."
     ),
-    "body_rate": Range(0.5, 35.0, 0.1, 8.0, "How fast the thrust direction may turn."),
+    "body_rate": Range(0.5, 35.0, 0.01, 8.0, "How fast the thrust direction may turn."),
     "angular_acceleration": Range(
-        5.0, 1000.0, 1.0, 100.0, "How fast that turning may change: what motor lag allows."
+        5.0, 400.0, 1.0, 100.0, "How fast that turning may change: what motor lag allows."
     ),
     "rotor_thrust": Range(0.0, 1.0, 0.0001, 0.1, "Most thrust of one rotor of the vehicle."),
     "least_rotor_thrust": Range(0.0, 1.0, 0.0001, 0.01, "Least thrust of one rotor."),

@@ -90,7 +90,10 @@ class PlanPanel:
         with tabs.add_tab("Method"):
             self._method_tab(gui)
         with tabs.add_tab("Legs"):
-            gui.add_markdown("Which limit holds each leg back. **reached**: raise it to fly faster.")
+            gui.add_markdown(
+                "The limits that each leg reaches, and for which part of its time. Raise the first "
+                "one to fly faster."
+            )
             self._legs = gui.add_html("")
         with tabs.add_tab("Files"):
             self._files_tab(gui)

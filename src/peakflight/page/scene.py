@@ -67,9 +67,9 @@ class Scene:
             "/axes", axes_length=1.5 * cell, axes_radius=0.03 * cell, origin_radius=0.06 * cell
         )
         camera = self._server.initial_camera
-        target = np.array([*centre[:2], 0.6 * centre[2]])
+        target = np.array([*centre[:2], 0.3 * centre[2]])
         camera.look_at = tuple(target)
-        camera.position = tuple(target + extent * np.array([-0.35, -1.0, 0.8]))
+        camera.position = tuple(target + extent * np.array([-0.28, -0.8, 0.68]))
         return f"grid at z = 0: cells of {cell:g} m, strong lines every {SECTION * cell:g} m"
 
     def draw_path(self, drawing: Drawing, *, fresh: bool = True) -> None:
@@ -160,6 +160,7 @@ class Scene:
         width: float,
     ) -> viser.LineSegmentsHandle:
         """Lines with other points: the same node as long as there are as many."""
+        shown = colours.for_lines(shown)
         if lines is None or lines.points.shape != points.shape:
             return self._server.scene.add_line_segments(
                 name, points, shown, thickness=width, thickness_units="screen"
@@ -176,4 +177,4 @@ def size_of(waypoints: np.ndarray) -> float:
 
 def leg_text(leg: Leg) -> str:
     """What a leg's label says."""
-    return f"{leg.duration:.2f} s \u00b7 {leg.limit}"
+    return f"{leg.duration:.2f} s \u00b7 {leg.held[0].label}"

@@ -5,7 +5,7 @@ import trimesh
 
 SIDES = 32
 """Of a ring."""
-THIN = 0.045
+THIN = 0.1
 """Width of a ring over its radius."""
 
 
