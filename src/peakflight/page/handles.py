@@ -121,7 +121,6 @@ class Handles:
                 position=positions[self._chosen],
             )
             self._gizmo.on_update(self._pulled)
-            self._gizmo.on_drag_end(self._released)
 
     def _ball_colours(self) -> np.ndarray:
         shown = np.tile(np.array(colours.WAYPOINT, dtype=np.uint8), (len(self._waypoints), 1))
@@ -180,10 +179,7 @@ class Handles:
 
     async def _pulled(self, event: Any) -> None:
         """The arrows are dragged."""
-        self._moved(self._chosen, np.array(event.target.position), "update")
-
-    async def _released(self, event: Any) -> None:
-        self._moved(self._chosen, np.array(event.target.position), "end")
+        self._moved(self._chosen, np.array(event.target.position), event.phase)
 
 
 def _on_level(

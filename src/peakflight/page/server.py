@@ -48,7 +48,7 @@ class PageServer:
         _check_free(host, port)
         self.access = Access.to(host)
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-        with guarded(self.access) as started:
+        with guarded(self.access) as started, _silence():
             self.viser = _Server(host=host, port=port, label="peakflight", verbose=False)
         if not started:
             self.viser.stop()
@@ -82,7 +82,7 @@ class PageServer:
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Keep viser from printing that it has stopped."""
+    """Keep viser from printing where it is and that it has stopped."""
     import rich
 
     console: Any = rich.get_console()
