@@ -251,8 +251,10 @@ class Planner:
     def _replace(self, edited: Edited) -> None:
         """Go on with the process that stands ready."""
         old, spare = self._process, self._spare
-        ready = spare is not None and spare.alive
-        self._process = spare if ready else SolverProcess(self._hear)  # type: ignore[assignment]
+        if spare is not None and not spare.alive:
+            spare.kill()
+            spare = None
+        self._process = spare or SolverProcess(self._hear)
         self._spare = self._warmed(edited)
         old.kill()
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from peakflight.course import Course
 from peakflight.errors import InvalidProblem
-from peakflight.limits import KINDS, PAPER_LIMITS, ROTORS, Limits
+from peakflight.limits import BOUNDING, KINDS, PAPER_LIMITS, ROTORS, Limits
 from peakflight.methods import DEFAULT_METHOD, METHODS
 from peakflight.problem import Problem
 from peakflight.result import Plan
@@ -133,13 +133,17 @@ class Edited:
         return self._with(yaw=yaw)
 
     def fly(self, vehicle: Vehicle | None) -> Self:
-        """Let something else fly, within its own limits; None keeps the limits that need none."""
+        """Let something else fly, within its own limits; None keeps the limits that need none.
+
+        Where none of those bounds the flight, the paper's are added.
+        """
         if vehicle is not None:
             return replace(self, problem=replace(self.problem, vehicle=vehicle, limits=None))
         limits = self.problem.limits.to_dict()
         kept = {name: value for name, value in limits.items() if name not in (*ROTORS, "airframe")}
-        problem = replace(self.problem, vehicle=None, limits=Limits(**kept) if kept else PAPER_LIMITS)
-        return replace(self, problem=problem)
+        if not set(kept) & set(BOUNDING):  # nothing is left that bounds the flight
+            kept = PAPER_LIMITS.to_dict() | kept
+        return replace(self, problem=replace(self.problem, vehicle=None, limits=Limits(**kept)))
 
     def limit(self, changes: Mapping[str, float | None]) -> Self:
         """Set limits by name, in SI units; None takes one away."""

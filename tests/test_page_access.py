@@ -1,0 +1,159 @@
+"""Who may look at the page."""
+
+import http.client
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+import peakflight as pf
+
+pytest.importorskip("viser")
+
+import viser
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from peakflight.page import Edited
+from peakflight.page.server import PageServer
+
+COURSE = pf.Course(np.array([[0.0, 0, 1], [2, 0, 1], [2, 2, 1.5]]))
+PROTOCOL = f"viser-v{viser.__version__}"
+
+
+@pytest.fixture(scope="module")
+def local() -> Iterator[PageServer]:
+    server = PageServer(Edited.of_course(COURSE), port=0)
+    yield server
+    server.close()
+
+
+@pytest.fixture(scope="module")
+def wide() -> Iterator[PageServer]:
+    server = PageServer(Edited.of_course(COURSE), host="0.0.0.0", port=0)
+    yield server
+    server.close()
+
+
+def get(server: PageServer, path: str = "/", **headers: str) -> http.client.HTTPResponse:
+    connection = http.client.HTTPConnection("127.0.0.1", server.viser.get_port(), timeout=20)
+    with closing(connection):
+        connection.request("GET", path, headers=headers)
+        response = connection.getresponse()
+        response.read()
+        return response
+
+
+def socket_status(server: PageServer, **headers: str) -> int:
+    """Of the handshake of a WebSocket: 101 if it is open."""
+    origin = headers.pop("Origin", None)
+    try:
+        with connect(
+            f"ws://127.0.0.1:{server.viser.get_port()}",
+            subprotocols=[PROTOCOL],  # type: ignore[list-item]
+            origin=origin,  # type: ignore[arg-type]
+            additional_headers=headers,
+        ) as connection:
+            assert connection.recv(timeout=20)
+            return 101
+    except InvalidStatus as refused:
+        return refused.response.status_code
+
+
+def test_this_machine_may(local: PageServer) -> None:
+    address = f"127.0.0.1:{local.viser.get_port()}"
+    assert local.url == f"http://{address}"
+    assert get(local).status == 200
+    assert socket_status(local) == 101
+    assert socket_status(local, Origin=f"http://{address}") == 101
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
+def test_another_sites_page_may_not(local: PageServer, origin: str) -> None:
+    assert socket_status(local, Origin=origin) == 403
+
+
+def test_another_name_for_this_machine_may_not(local: PageServer) -> None:
+    assert get(local, Host="evil.example").status == 403
+
+
+def test_beyond_this_machine_the_token_is_needed(wide: PageServer) -> None:
+    token = wide.access.token
+    assert token is not None
+    assert wide.url.endswith(f"/?token={token}")
+    assert len(token) >= 32
+    assert get(wide).status == 403
+    assert get(wide, "/?token=wrong").status == 403
+    assert socket_status(wide) == 403
+    assert socket_status(wide, Cookie="peakflight_token=wrong") == 403
+    entered = get(wide, urlsplit(wide.url).path + "?" + urlsplit(wide.url).query)
+    assert entered.status == 303
+    assert entered.headers["Location"] == "/"
+    cookie = entered.headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    assert get(wide, Cookie=cookie.split(";")[0]).status == 200
+    assert socket_status(wide, Cookie=cookie.split(";")[0]) == 101
+    assert socket_status(wide, Cookie=cookie.split(";")[0], Origin="http://evil.example") == 403
+    assert token not in repr(wide.access)
+
+
+def test_tokens_differ() -> None:
+    from peakflight.page.access import Access
+
+    assert Access.to("0.0.0.0").token != Access.to("0.0.0.0").token
+    assert Access.to("127.0.0.1").token is None
+
+
+def test_a_port_in_use_is_said_in_a_line(local: PageServer) -> None:
+    with pytest.raises(pf.InvalidProblem, match="--port"):
+        PageServer(Edited.of_course(COURSE), port=local.viser.get_port())
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "peakflight", "page", *arguments, "--no-browser"]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_bad_courses_end_as_those_of_plan(tmp_path: object) -> None:
+    done = run("nowhere.csv")
+    assert done.returncode == 2
+    assert done.stderr == "peakflight: nowhere.csv: no such file\n"
+
+
+def test_the_port_in_use_ends_the_command() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        done = run("--port", str(taken.getsockname()[1]))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "in use" in done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no signals")
+def test_ctrl_c_ends_it_and_its_processes() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "peakflight", "page", "--port", "0", "--no-browser", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert process.stdout is not None
+    url = json.loads(process.stdout.readline())["url"]
+    assert url.startswith("http://127.0.0.1:")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert err.strip().splitlines()[-1] == "peakflight: interrupted"
+    assert "Traceback" not in err
