@@ -17,7 +17,7 @@ from benchmarks.scope import Scope
 SUITES = (
     "startup", "flight_time", "methods", "random_joint", "unseen_bound", "rotor_limits",
     "few_pieces", "comparison", "speed", "peers", "simulation", "flight_check", "tuning", "memory",
-    "batches",
+    "batches", "page",
 )  # fmt: skip
 """Modules of this folder, imported when they run: a quick run chooses the cache of kernels first,
 and what the first plan of all compiles is there for the rest."""

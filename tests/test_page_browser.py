@@ -221,9 +221,7 @@ def test_a_broken_upload_is_refused_with_words_and_all_stays(
     assert server.page.edited is before
 
 
-def test_two_clients_see_the_same_course(
-    visit: Callable[..., Visit], server: PageServer
-) -> None:
+def test_two_clients_see_the_same_course(visit: Callable[..., Visit], server: PageServer) -> None:
     one, other = visit(), visit()
     one.tab.bring_to_front()
     one.open("Course")
@@ -240,7 +238,7 @@ def test_a_course_of_200_waypoints_is_still_edited_by_hand(
 ) -> None:
     page = visit()
     steps = np.random.default_rng(3).normal(size=(200, 3)) * (1.5, 1.5, 0.2)
-    waypoints = np.cumsum(steps, axis=0) + (0.0, 0.0, 5.0)
+    waypoints = np.cumsum(steps, axis=0) + np.array([0.0, 0.0, 5.0])
     text = "x,y,z\n" + "\n".join(",".join(f"{x:.3f}" for x in row) for row in waypoints)
     server.page.load("long.csv", text.encode(), None)
     until(lambda: len(server.page.edited.waypoints) == 200, "loaded")

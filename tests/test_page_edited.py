@@ -63,9 +63,7 @@ def test_yaw_and_fixed_motion_go_with_their_waypoint() -> None:
         (lambda one: one.limit({"thrust_acceleration": 9.0}), "above gravity"),
         (lambda one: one.limit({"rotor_thrust": 0.1}), "vehicle"),
         (
-            lambda one: one.limit(
-                dict.fromkeys(("speed", "thrust_acceleration", "jerk", "snap"))
-            ),
+            lambda one: one.limit(dict.fromkeys(("speed", "thrust_acceleration", "jerk", "snap"))),
             "no limit",
         ),
     ],

@@ -15,11 +15,12 @@ from peakflight.page.drawing import Drawing
 from peakflight.page.edited import Edited
 from peakflight.page.header import Summary, badge, header, legs_table
 from peakflight.page.solver import Request, answer
+from peakflight.page.states import states
 from peakflight.page.thread import PageThread
 
 COURSES = Path(__file__).parent.parent / "examples" / "courses"
 STEPS = np.random.default_rng(5).normal(size=(200, 3)) * (1.5, 1.5, 0.2)
-LONG = np.cumsum(STEPS, axis=0) + (0.0, 0.0, 5.0)
+LONG = np.cumsum(STEPS, axis=0) + np.array([0.0, 0.0, 5.0])
 
 
 def edited(count: int = 6) -> Edited:
@@ -158,7 +159,7 @@ def test_text_of_others_is_not_markup() -> None:
 
 def test_legs_say_what_holds_them_back() -> None:
     plan = pf.plan(edited().problem)
-    drawing = Drawing(plan)
+    drawing = Drawing(plan, states(plan))
     assert sum(leg.duration for leg in drawing.legs) == pytest.approx(plan.duration)
     starts = np.concatenate(([0], np.cumsum(plan.pieces)))
     for leg in drawing.legs:
@@ -174,13 +175,13 @@ def test_legs_say_what_holds_them_back() -> None:
 def test_the_vehicle_is_drawn_where_it_is_and_as_it_leans(vehicle: str | None) -> None:
     course = edited() if vehicle is None else edited().fly(pf.find_vehicle(vehicle))
     plan = pf.plan(course.problem, pieces=1)
-    drawing = Drawing(plan)
+    drawing = Drawing(plan, states(plan))
     for t in np.linspace(0.0, plan.duration, 23):
         position, (w, x, y, z), _ = drawing.at(float(t))
         assert position == pytest.approx(plan.trajectory(min(t, plan.duration)))
         up = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
         if vehicle is None:  # no drag: the thrust is along a + g e3
-            force = plan.trajectory(t, derivative=2) + (0.0, 0.0, pf.GRAVITY)
+            force = plan.trajectory(t, derivative=2) + np.array([0.0, 0.0, pf.GRAVITY])
             assert up @ force / np.linalg.norm(force) > 0.995  # between samples of the path
     assert drawing.path[0] == pytest.approx(course.waypoints[0])
     assert drawing.path[-1] == pytest.approx(course.waypoints[-1])

@@ -11,7 +11,13 @@ from peakflight.course import Course
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.vehicle import Vehicle
 
-FIRST_COURSE = ((0.0, 0.0, 1.0), (2.0, 1.0, 1.5), (3.0, 3.0, 1.0), (1.0, 4.0, 2.0), (-1.0, 2.0, 1.2))
+FIRST_COURSE = (
+    (0.0, 0.0, 1.0),
+    (2.0, 1.0, 1.5),
+    (3.0, 3.0, 1.0),
+    (1.0, 4.0, 2.0),
+    (-1.0, 2.0, 1.2),
+)
 """m, what the page begins with where no course is named."""
 
 
@@ -93,5 +99,3 @@ def _announce(url: str, local: bool, notes: tuple[str, ...], as_json: bool) -> N
     if not local:
         click.echo("whoever has this address can edit; the connection is not encrypted")
     click.echo("Ctrl-C ends it")
-
-

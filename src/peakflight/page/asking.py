@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from peakflight.page.edited import Edited
 from peakflight.page.process import SolverProcess
 from peakflight.page.solver import Answer, Notice, Request
+from peakflight.page.states import States
 from peakflight.result import Plan
 
 QUIET = 0.2
@@ -22,8 +23,8 @@ SWIFT = 0.12
 SLUGGISH = 0.06
 """What a draft with all pieces may take before the next ones have one a leg, s."""
 PATIENCE, GRACE = 1.0, 0.2
-"""How long a draft, and a whole plan, may take when there is something newer, s; then it is stopped,
-and a process with it."""
+"""How long a draft, and a whole plan, may take when there is something newer, s; then it is
+stopped, and a process with it."""
 WARM_LEGS = 2
 """Legs of the course by which a new process is warmed up."""
 
@@ -35,6 +36,8 @@ class Shown:
     edited: Edited
     """What it is about."""
     plan: Plan | None = None
+    states: States | None = None
+    """What the vehicle does on it; there if the plan is."""
     error: str = ""
     guess: float | None = None
     """Total time of the paper's initial guess, s, if known."""
@@ -150,6 +153,7 @@ class Planner:
                 Shown(
                     edited=job.wish.edited,
                     plan=answer.plan,
+                    states=answer.states,
                     error=answer.error,
                     guess=answer.guess,
                     seconds=answer.seconds,
@@ -184,12 +188,13 @@ class Planner:
         return job
 
     def _is_whole(self, wish: _Wish) -> bool:
-        """Whether a wish is next planned in whole: after its draft, or where a draft gains nothing."""
+        """Whether it is next planned in whole: after its draft, or where that gains nothing."""
         if wish.drafted or wish.edited.method != "joint":
             return True
         last = self._last
-        swift = last is not None and last.wall_time_s < SWIFT
-        return wish.rests and swift and len(wish.edited.waypoints) < 2 * len(last.problem.waypoints)  # type: ignore[union-attr]
+        if last is None or not wish.rests or last.wall_time_s >= SWIFT:
+            return False
+        return len(wish.edited.waypoints) < 2 * len(last.problem.waypoints)
 
     def _request(self, job: _Job) -> Request:
         edited = job.wish.edited

@@ -1,23 +1,19 @@
 """What is drawn of a plan, as plain arrays: the path and its colours, curves, legs, the vehicle."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from peakflight.flatness import FlatStates, planned_states, states_along
-from peakflight.heading import heading
 from peakflight.limits import KINDS, limited_values, plain_unit
+from peakflight.page import states
 from peakflight.page.colours import along_scale
 from peakflight.result import BINDING, Plan
 from peakflight.vehicle import Vehicle
-from peakflight.vehicles import VEHICLES
 from peakflight.yaw import ALL_LABELS
 
-MOST_POINTS, LEAST_A_LEG, MOST_A_LEG = 2400, 10, 60
-"""Of the path: enough to look smooth, few enough to be sent in a frame."""
 CURVE_POINTS = 361
 """Of each plot: about one a pixel."""
 AT_LIMIT = 0.995
@@ -26,8 +22,6 @@ ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
 """Plots that are always there, limited or not."""
 PAIRED = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
 """Limits from below, which are drawn with what they are the least of."""
-STAND_IN = replace(VEHICLES["crazyflie-2.1-upgrade"], drag=(0.0, 0.0))
-"""What is drawn where no vehicle is named: its attitude without drag is that of any other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,16 +71,13 @@ class Drawing:
     """A plan as it is drawn. Nothing here is proof: that is in `plan.report`."""
 
     plan: Plan
+    states: states.States
+    """At `path_times`."""
 
     @cached_property
     def path_times(self) -> np.ndarray:
         """(P,) s, through every waypoint."""
-        times = self.plan.waypoint_times
-        legs = len(times) - 1
-        count = int(np.clip(MOST_POINTS // legs, LEAST_A_LEG, MOST_A_LEG))
-        shares = np.arange(count) / count
-        inner = times[:-1, None] + shares * np.diff(times)[:, None]
-        return np.append(inner.ravel(), times[-1])
+        return states.path_times(self.plan)
 
     @cached_property
     def path(self) -> np.ndarray:
@@ -169,12 +160,15 @@ class Drawing:
             if kind.name in PAIRED or (limit is None and kind.name not in ALWAYS):
                 continue
             if kind.name == "rotor_thrust":
-                if self.plan.vehicle is None:
-                    continue
-                shown: tuple[np.ndarray, ...] = tuple(planned_states(plan, times).rotor_thrust.T)
+                shown: tuple[np.ndarray, ...] = tuple(
+                    np.interp(times, self.path_times, thrust)
+                    for thrust in self.states.rotor_thrust.T
+                )
             else:
                 shown = (values[kind.name],)
-            bounds = [limit] + [getattr(limits, low) for low, of in PAIRED.items() if of == kind.name]
+            bounds = [limit] + [
+                getattr(limits, low) for low, of in PAIRED.items() if of == kind.name
+            ]
             lines = tuple(float(bound) for bound in bounds if bound is not None)
             unit = plain_unit(kind.unit)
             if kind.unit == "rad":
@@ -187,30 +181,17 @@ class Drawing:
     @property
     def flown(self) -> Vehicle:
         """What is drawn as flying."""
-        return self.plan.vehicle or STAND_IN
-
-    @cached_property
-    def states(self) -> FlatStates:
-        """What the vehicle does at `path_times`."""
-        if self.plan.vehicle is not None:
-            return planned_states(self.plan, self.path_times)
-        turn = heading(self.plan)
-        return states_along(
-            self.plan.trajectory,
-            self.path_times,
-            STAND_IN,
-            yaw=lambda times: [turn(times, order)[..., 0] for order in (0, 1, 2)],
-        )
+        return states.flown(self.plan)
 
     def at(self, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position (3,) m, attitude (4,) as w, x, y, z and rotor thrusts (4,) N at a time, s."""
         begin = self.plan.trajectory.start_time
-        times, states = self.path_times - begin, self.states
+        times, known = self.path_times - begin, self.states
         seconds = min(max(seconds, 0.0), self.plan.duration)
         after = int(np.clip(np.searchsorted(times, seconds), 1, len(times) - 1))
         share = (seconds - times[after - 1]) / (times[after] - times[after - 1])
-        one, other = states.attitude[after - 1], states.attitude[after]
+        one, other = known.attitude[after - 1], known.attitude[after]
         attitude = (1.0 - share) * one + share * (other if one @ other >= 0.0 else -other)
-        thrusts = (1.0 - share) * states.rotor_thrust[after - 1] + share * states.rotor_thrust[after]
+        thrusts = (1.0 - share) * known.rotor_thrust[after - 1] + share * known.rotor_thrust[after]
         position = self.plan.trajectory(min(begin + seconds, self.plan.trajectory.end_time))
         return position, attitude / np.linalg.norm(attitude), thrusts

@@ -138,7 +138,7 @@ class Edited:
         Where none of those bounds the flight, the paper's are added.
         """
         if vehicle is not None:
-            return replace(self, problem=replace(self.problem, vehicle=vehicle, limits=None))
+            return replace(self, problem=replace(self.problem, vehicle=vehicle, limits=None))  # type: ignore[arg-type]
         limits = self.problem.limits.to_dict()
         kept = {name: value for name, value in limits.items() if name not in (*ROTORS, "airframe")}
         if not set(kept) & set(BOUNDING):  # nothing is left that bounds the flight
@@ -147,7 +147,9 @@ class Edited:
 
     def limit(self, changes: Mapping[str, float | None]) -> Self:
         """Set limits by name, in SI units; None takes one away."""
-        values = {kind.name: getattr(self.problem.limits, kind.name) for kind in KINDS} | dict(changes)
+        values = {kind.name: getattr(self.problem.limits, kind.name) for kind in KINDS} | dict(
+            changes
+        )
         airframe = self.problem.airframe
         if any(values[name] is not None for name in ROTORS):
             if airframe is None:
@@ -210,7 +212,7 @@ class Edited:
     def _rearranged(
         self, waypoints: np.ndarray, angles: np.ndarray | None, order: list[Any]
     ) -> Self:
-        """Other waypoints; what is fixed at inner ones goes with them, as long as they are inner."""
+        """Other waypoints; what is fixed at inner ones goes with them while they are inner."""
         last = len(order) - 1
         derivatives = {
             place: self.problem.derivatives[old]
@@ -228,19 +230,17 @@ def nearest_leg(waypoints: np.ndarray, origin: ArrayLike, direction: ArrayLike) 
     origin, direction
         (3,) m, and (3,) of any length.
     """
-    origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-    direction = direction / np.linalg.norm(direction)
+    eye, sight = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
+    sight = sight / np.linalg.norm(sight)
     shares = np.linspace(0.0, 1.0, LOOKS)[:, None]
     points = waypoints[:-1, None] + shares * (waypoints[1:, None] - waypoints[:-1, None])
-    return int(np.argmin(_off_sight(points, origin, direction).min(axis=1)))
+    return int(np.argmin(_off_sight(points, eye, sight).min(axis=1)))
 
 
-def nearest_point(
-    points: np.ndarray, origin: ArrayLike, direction: ArrayLike
-) -> tuple[int, float]:
+def nearest_point(points: np.ndarray, origin: ArrayLike, direction: ArrayLike) -> tuple[int, float]:
     """Index of the one of (n, 3) points that is nearest to a line of sight, and its angle, rad."""
-    origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-    off = _off_sight(points, origin, direction / np.linalg.norm(direction))
+    eye, sight = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
+    off = _off_sight(points, eye, sight / np.linalg.norm(sight))
     index = int(np.argmin(off))
     return index, float(off[index])
 

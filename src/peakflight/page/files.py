@@ -30,7 +30,9 @@ def load(path: Path, like: Edited | None = None) -> tuple[Edited, tuple[str, ...
         raise InvalidFile(f"{path}: has {path.stat().st_size / 1e6:.0f} MB; the page takes 20")
     notes: tuple[str, ...] = ()
     if _is_plan(path):
-        edited = Edited.of_plan(Plan.load(path), path.parent.name if path.stem == "plan" else path.stem)
+        edited = Edited.of_plan(
+            Plan.load(path), path.parent.name if path.stem == "plan" else path.stem
+        )
     else:
         course = read_course(path)
         try:
@@ -111,7 +113,7 @@ def _like(edited: Edited, like: Edited) -> Edited:
     """A course, flown and planned as another was; its own yaw goes before."""
     yaw = edited.problem.yaw
     if yaw is None and like.angles is None:
-        yaw = like.problem.yaw  # type: ignore[assignment]
+        yaw = like.problem.yaw
     problem = like.problem.__class__(
         edited.waypoints,
         limits=like.problem.limits,

@@ -1,6 +1,7 @@
 """The panel of the flight: the scale of speed, playback, and plots against the limits."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,13 @@ WIDTH = 370
 PLOT_HEIGHT = 108
 HEADROOM = 1.12
 """Top of a plot over the highest that it shows."""
-SPEEDS = {"\u00bc \u00d7": 0.25, "\u00bd \u00d7": 0.5, "1 \u00d7": 1.0, "2 \u00d7": 2.0, "4 \u00d7": 4.0}
+SPEEDS = {
+    "\u00bc \u00d7": 0.25,
+    "\u00bd \u00d7": 0.5,
+    "1 \u00d7": 1.0,
+    "2 \u00d7": 2.0,
+    "4 \u00d7": 4.0,
+}
 """Of playback."""
 SLIDER_STEP = 0.01
 """s."""
@@ -48,19 +55,22 @@ class FlightPanel:
                 "Time (s)", 0.0, 1.0, SLIDER_STEP, 0.0, hint="Where the vehicle is drawn."
             )
             self._pace = server.gui.add_dropdown(
-                "Pace", tuple(SPEEDS), initial_value="1 \u00d7", hint="How fast the flight is played."
+                "Pace",
+                tuple(SPEEDS),
+                initial_value="1 \u00d7",
+                hint="How fast the flight is played.",
             )
             with server.gui.add_folder("Show", expand_by_default=False):
                 for name, label, on, hint in VIEWS:
                     box = server.gui.add_checkbox(label, on, hint=hint)
-                    box.on_update(_from_client(lambda value, name=name: viewed(name, value)))
+                    box.on_update(_from_client(partial(viewed, name)))
         panel.dock_left()
         panel.set_width(WIDTH)
         self.playing = False
         self._play.on_click(_clicked(lambda: played(not self.playing)))
         self._slider.on_update(_from_client(sought))
         self._pace.on_update(_from_client(lambda value: paced(SPEEDS[value])))
-        command = server.gui.add_command("Play or stop", hotkey=" ")
+        command = server.gui.add_command("Play or stop", hotkey="space")
         command.on_trigger(_clicked(lambda: played(not self.playing)))
 
     def set_playing(self, playing: bool) -> None:
@@ -87,8 +97,10 @@ class FlightPanel:
         times = drawing.curve_times
         for curve in drawing.curves:
             data, top = _data(times, curve, seconds)
-            scales = {"x": {"time": False, "range": (0.0, float(times[-1]))},
-                      "y": {"range": (0.0, top)}}
+            scales = {
+                "x": {"time": False, "range": (0.0, float(times[-1]))},
+                "y": {"range": (0.0, top)},
+            }
             plot = self._plots.get(curve.name)
             if plot is None or len(plot.data) != len(data):
                 if plot is not None:
@@ -109,15 +121,21 @@ class FlightPanel:
         series: list[Any] = [{}]
         for index in range(len(curve.values)):
             stroke = colours.OTHERS[index] if several else colours.CURVE
-            series.append({"stroke": stroke, "width": 1.2 if several else 1.8,
-                           "points": {"show": False}})
-        for _ in curve.limits:
-            series.append({"stroke": colours.BAD, "width": 1.2, "dash": (6, 4),
-                           "points": {"show": False}})
-        series.append({"stroke": colours.INK, "width": 1.2, "points": {"show": False},
-                       "spanGaps": False})
-        axis = {"font": "11px sans-serif", "stroke": colours.QUIET, "size": 30,
-                "grid": {"stroke": "#edf0f3", "width": 1}, "ticks": {"show": False}}
+            series.append(
+                {"stroke": stroke, "width": 1.2 if several else 1.8, "points": {"show": False}}
+            )
+        line = {"stroke": colours.BAD, "width": 1.2, "dash": (6, 4), "points": {"show": False}}
+        series += [line] * len(curve.limits)
+        series.append(
+            {"stroke": colours.INK, "width": 1.2, "points": {"show": False}, "spanGaps": False}
+        )
+        axis = {
+            "font": "11px sans-serif",
+            "stroke": colours.QUIET,
+            "size": 30,
+            "grid": {"stroke": "#edf0f3", "width": 1},
+            "ticks": {"show": False},
+        }
         return self._server.gui.add_uplot(
             data,
             tuple(series),
@@ -140,9 +158,7 @@ VIEWS = (
 ORDER = {"speed": 1, "thrust_acceleration": 2, "jerk": 3, "snap": 4}
 
 
-def _data(
-    times: np.ndarray, curve: Curve, seconds: float
-) -> tuple[tuple[np.ndarray, ...], float]:
+def _data(times: np.ndarray, curve: Curve, seconds: float) -> tuple[tuple[np.ndarray, ...], float]:
     """Times, values, limits and mark as columns, and the top of the plot."""
     top = HEADROOM * max(*(float(one.max()) for one in curve.values), *curve.limits, 1e-9)
     lines = tuple(np.full(len(times), limit) for limit in curve.limits)

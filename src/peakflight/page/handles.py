@@ -1,4 +1,4 @@
-"""The waypoints as handles: balls to drag, numbers, rings across the path, arrows at the chosen one.
+"""The waypoints as handles: balls to drag, numbers, rings across the path, arrows at one of them.
 
 A ball that is dragged stays at its height; with Shift it goes straight up and down. The chosen one
 has arrows beside it, along the axes.
@@ -182,9 +182,7 @@ class Handles:
         self._moved(self._chosen, np.array(event.target.position), event.phase)
 
 
-def _on_level(
-    begin: np.ndarray, shift: np.ndarray, eye: np.ndarray, extent: float
-) -> np.ndarray:
+def _on_level(begin: np.ndarray, shift: np.ndarray, eye: np.ndarray, extent: float) -> np.ndarray:
     """Where a line of sight meets the level of where it began.
 
     Parameters
@@ -200,7 +198,9 @@ def _on_level(
     if abs(sight[2]) > GRAZING * float(np.linalg.norm(sight)):
         along = (begin[2] - eye[2]) / sight[2]
         reached = eye + along * sight - begin
-        if along > 0.0 and np.linalg.norm(reached) < FAR * max(extent, float(np.linalg.norm(begin - eye))):
+        if along > 0.0 and np.linalg.norm(reached) < FAR * max(
+            extent, float(np.linalg.norm(begin - eye))
+        ):
             level = np.array([reached[0], reached[1], 0.0])
     return begin + level
 

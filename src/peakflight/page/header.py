@@ -46,7 +46,7 @@ def badge(summary: Summary) -> tuple[str, str, str]:
         return "not certified", colours.BAD, why
     if summary.error or not summary.fresh:
         return "earlier plan", colours.QUIET, "what is drawn does not answer the course as it is"
-    return "certified", colours.GOOD, "every limit is proven from the coefficients, not sampled"
+    return "certified", colours.GOOD, "every limit is proven, not sampled"
 
 
 def header(summary: Summary) -> str:
@@ -123,9 +123,7 @@ def _gain(duration: float, other: float | None, what: str) -> list[str]:
     if abs(part) < 0.005:
         return [f"as long as {what} ({other:.3f} s)"]
     word, colour = ("shorter", colours.GOOD) if part < 0.0 else ("longer", colours.BAD)
-    return [
-        f'<b style="color:{colour}">{abs(part):.1f} % {word}</b> than {what} ({other:.3f} s)'
-    ]
+    return [f'<b style="color:{colour}">{abs(part):.1f} % {word}</b> than {what} ({other:.3f} s)']
 
 
 def _state(summary: Summary) -> str:

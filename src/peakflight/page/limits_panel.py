@@ -60,11 +60,18 @@ class LimitsPanel:
         for kind in KINDS:
             given = RANGES[kind.name]
             self._boxes[kind.name] = server.gui.add_checkbox(
-                f"{kind.label[0].upper()}{kind.label[1:]}", False, hint=f"{given.hint} Untick to lift."
+                f"{kind.label[0].upper()}{kind.label[1:]}",
+                False,
+                hint=f"{given.hint} Untick to lift.",
             )
             self._sliders[kind.name] = server.gui.add_slider(
                 plain_unit("°" if kind.unit == "rad" else kind.unit),
-                given.low, given.high, given.step, given.usual, hint=given.hint, visible=False,
+                given.low,
+                given.high,
+                given.step,
+                given.usual,
+                hint=given.hint,
+                visible=False,
             )
             self._boxes[kind.name].on_update(self._ticked(kind))
             self._sliders[kind.name].on_update(self._slid(kind))
@@ -72,8 +79,10 @@ class LimitsPanel:
     def show(self, edited: Edited) -> None:
         """Set boxes and sliders to the limits of what is edited."""
         before, self._edited = self._edited, edited
-        if before is not None and before.problem.limits == edited.problem.limits and (
-            before.vehicle is edited.vehicle
+        if (
+            before is not None
+            and before.problem.limits == edited.problem.limits
+            and (before.vehicle is edited.vehicle)
         ):
             return
         for kind in KINDS:

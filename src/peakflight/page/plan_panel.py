@@ -1,7 +1,8 @@
-"""The panel of the plan: header, undo, the chosen waypoint, limits, how it is planned, legs, files."""
+"""The panel of the plan: header, undo, the chosen waypoint, limits, method, legs, files."""
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -78,7 +79,10 @@ class PlanPanel:
         )
         self._accept.on_click(_click(actions.accept))
         self._cancel = gui.add_button(
-            "Stop planning", icon=viser.Icon.X, color="red", visible=False,
+            "Stop planning",
+            icon=viser.Icon.X,
+            color="red",
+            visible=False,
             hint="Stop the solve at hand; what is drawn stays.",
         )
         self._cancel.on_click(_click(actions.cancel))
@@ -119,12 +123,11 @@ class PlanPanel:
         )
         self._yaw.on_update(_value(lambda degrees: do.turn(float(degrees))))
         adds = gui.add_button_group(
-            "Add", ("After it", "At the end"),
+            "Add",
+            ("After it", "At the end"),
             hint="A waypoint in the middle of the next leg, or beyond the last one.",
         )
-        adds.on_click(
-            _value(lambda word: do.insert_after() if word == "After it" else do.append())
-        )
+        adds.on_click(_value(lambda word: do.insert_after() if word == "After it" else do.append()))
         order = gui.add_button_group(
             "Order", ("Earlier", "Later"), hint="Pass it one place earlier or later."
         )
@@ -133,7 +136,8 @@ class PlanPanel:
             "Delete it", icon=viser.Icon.TRASH, color="gray", hint="Take the chosen waypoint out."
         ).on_click(_click(do.delete))
         click = gui.add_checkbox(
-            "Add by clicking", False,
+            "Add by clicking",
+            False,
             hint="A click on the path adds a waypoint to that leg; elsewhere, at the end of the "
             "course, at the height of its last waypoint. Ctrl-click does so at any time.",
         )
@@ -143,12 +147,15 @@ class PlanPanel:
     def _limits_tab(self, server: viser.ViserServer) -> None:
         gui, do = server.gui, self._do
         self._vehicle = gui.add_dropdown(
-            "Vehicle", (NO_VEHICLE, *VEHICLES), initial_value=NO_VEHICLE,
+            "Vehicle",
+            (NO_VEHICLE, *VEHICLES),
+            initial_value=NO_VEHICLE,
             hint="What flies. It brings limits that it can keep, which you can change below.",
         )
         self._vehicle.on_update(_value(lambda name: do.fly(None if name == NO_VEHICLE else name)))
         self._rotors = gui.add_button(
-            "Limit its rotors themselves", visible=False,
+            "Limit its rotors themselves",
+            visible=False,
             hint="Rotor thrusts and body rate in place of the limits that stand for them: faster, "
             "with nothing left for control.",
         )
@@ -158,26 +165,39 @@ class PlanPanel:
     def _method_tab(self, gui: Any) -> None:
         do = self._do
         self._method = gui.add_dropdown(
-            "Method", tuple(METHODS), initial_value="joint",
+            "Method",
+            tuple(METHODS),
+            initial_value="joint",
             hint="; ".join(f"{name}: {what}" for name, what in METHODS.items()),
         )
         self._method.on_update(_value(lambda name: do.plan_by(method=name)))
         self._pieces = gui.add_dropdown(
-            "Pieces a leg", tuple(PIECES), initial_value="where it pays",
-            hint="Polynomials in each leg, of method joint: more are faster, but flight files grow.",
+            "Pieces a leg",
+            tuple(PIECES),
+            initial_value="where it pays",
+            hint="Polynomials in each leg, of method joint: more fly faster and make larger files.",
         )
         self._pieces.on_update(_value(lambda word: do.plan_by(pieces=PIECES[word])))
         self._cost = gui.add_dropdown(
-            "Cost", COSTS, initial_value="jerk", hint="What splines keep small, and what smoothness weighs."
+            "Cost",
+            COSTS,
+            initial_value="jerk",
+            hint="What splines keep small, and what smoothness weighs.",
         )
         self._cost.on_update(_value(lambda word: do.plan_by(minimize=word)))
         self._effort = gui.add_number(
-            "Smoothness", 0.0, min=0.0, step=0.0001,
+            "Smoothness",
+            0.0,
+            min=0.0,
+            step=0.0001,
             hint="Weight of the cost beside the time, of method joint: 0 is the fastest.",
         )
         self._effort.on_update(_value(lambda weight: do.plan_by(effort=float(weight))))
         self._policy = gui.add_dropdown(
-            "Yaw", tuple(YAWS), initial_value="not asked for", hint="Where the nose points during the flight."
+            "Yaw",
+            tuple(YAWS),
+            initial_value="not asked for",
+            hint="Where the nose points during the flight.",
         )
         self._angle = gui.add_number("Angle (°)", 0.0, step=1.0, visible=False, hint="Of the nose.")
         self._point = gui.add_vector3(
@@ -193,28 +213,31 @@ class PlanPanel:
         do = self._do
         self._message = gui.add_html("")
         upload = gui.add_upload_button(
-            "Load a course or plan", icon=viser.Icon.UPLOAD,
+            "Load a course or plan",
+            icon=viser.Icon.UPLOAD,
             hint="A course as CSV (x,y,z a line), YAML or JSON, or a plan.json.",
         )
 
-        @upload.on_upload
-        async def _(event: Any) -> None:
+        async def uploaded(event: Any) -> None:
             given = event.target.value
             do.load(given.name, given.content, event.client)
 
+        upload.on_upload(uploaded)
+
         for label, what, hint in SAVES:
             gui.add_button(label, icon=viser.Icon.DOWNLOAD, hint=hint).on_click(
-                _client(lambda client, what=what: do.save(what, client))
+                _client(partial(do.save, what))
             )
         names = tuple(FLIGHT_FORMATS)
         self._format = gui.add_dropdown(
             "Flight file", names, initial_value="crazyswarm", hint="What is to fly it, or read it."
         )
         self._about = gui.add_markdown("")
-        self._format.on_update(_value(lambda name: self._explain(name)))
+        self._format.on_update(_value(self._explain))
         self._explain(self._format.value)
         gui.add_button(
-            "Export the flight file", icon=viser.Icon.FILE_EXPORT,
+            "Export the flight file",
+            icon=viser.Icon.FILE_EXPORT,
             hint="Written, read back as its consumer reads it, and proven again.",
         ).on_click(_client(lambda client: do.save(f"export:{self._format.value}", client)))
 
@@ -288,7 +311,11 @@ class PlanPanel:
 
 
 SAVES = (
-    ("Save the course (CSV)", "course", "The waypoints: x, y, z in m, and yaw in rad if asked for."),
+    (
+        "Save the course (CSV)",
+        "course",
+        "The waypoints: x, y, z in m, and yaw in rad if asked for.",
+    ),
     ("Save the plan (plan.json)", "plan", "Everything, with the proof; peakflight check reads it."),
 )
 """Label, what is saved, hint."""

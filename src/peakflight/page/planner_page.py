@@ -90,7 +90,8 @@ class Page:
         busy = self.planner.busy
         return Summary(
             plan=self.drawn,
-            fresh=shown is not None and (shown.edited is self.edited or self._history.gesture != ""),
+            fresh=shown is not None
+            and (shown.edited is self.edited or self._history.gesture != ""),
             whole=shown is not None and shown.whole,
             error=self._error,
             busy=busy if busy is not None and busy > BUSY_AFTER else None,
@@ -136,9 +137,12 @@ class Page:
             self._post(lambda: self._end_move(index, position))
         else:
             key = ("move", index) if phase == "update" else None
-            self._post(lambda: self._edit(
-                lambda now: now.move(index, position), f"move {index}", rests=False
-            ), key)
+            self._post(
+                lambda: self._edit(
+                    lambda now: now.move(index, position), f"move {index}", rests=False
+                ),
+                key,
+            )
 
     def place(self, position: tuple[float, float, float]) -> None:
         """Put the chosen waypoint somewhere."""
@@ -170,13 +174,17 @@ class Page:
 
     def fly(self, name: str | None) -> None:
         """Let another vehicle fly."""
-        self._post(lambda: self._edit(lambda now: now.fly(None if name is None else _known(now, name))))
+        self._post(
+            lambda: self._edit(lambda now: now.fly(None if name is None else _known(now, name)))
+        )
 
     def rotors_alone(self) -> None:
         """Limit the vehicle's rotors themselves."""
-        self._post(lambda: self._edit(
-            lambda now: now if now.vehicle is None else now.fly(now.vehicle.on_rotors())
-        ))
+        self._post(
+            lambda: self._edit(
+                lambda now: now if now.vehicle is None else now.fly(now.vehicle.on_rotors())
+            )
+        )
 
     def limit(self, name: str, value: float | None, moving: bool) -> None:
         """Set a limit, in SI units, or lift it."""
@@ -275,13 +283,13 @@ class Page:
             return
         self._history, self._error = history, ""
         edited = history.present
+        self.planner.ask(edited, rests=rests)
         self._chosen = min(self._chosen, len(edited.waypoints) - 1)
         self._handles.show(edited.waypoints, self._chosen)
         if rests:
             self._panel.show_edited(edited, self._chosen)
         else:
             self._panel.show_chosen(edited, self._chosen)
-        self.planner.ask(edited, rests=rests)
 
     def _end_move(self, index: int, position: np.ndarray) -> None:
         """A waypoint is let go."""
@@ -389,14 +397,14 @@ class Page:
         if guess is None and self._shown is not None and not shown.whole:
             guess = self._shown.guess
         self._shown = Shown(**{**shown.__dict__, "guess": guess})
-        if shown.plan is None:
+        if shown.plan is None or shown.states is None:
             self._error = shown.error
             if self._drawing is not None:
                 self._scene.draw_path(self._drawing, fresh=False)
             self._show_header()
             return
         self._error = ""
-        self._drawing = drawing = Drawing(shown.plan)
+        self._drawing = drawing = Drawing(shown.plan, shown.states)
         self._scene.draw_path(drawing)
         self._show_header()
         self._server.flush()
@@ -498,8 +506,10 @@ class _Saving:
         if self._plan is None:
             raise PeakflightError("there is no plan of the course as it is yet")
         if self._what == "plan":
-            said = "saved plan.json" if self._plan.report.feasible else (
-                "saved plan.json, which is not proven to keep the limits"
+            said = (
+                "saved plan.json"
+                if self._plan.report.feasible
+                else ("saved plan.json, which is not proven to keep the limits")
             )
             return "plan.json", files.plan_json(self._plan), said
         to = self._what.partition(":")[2]

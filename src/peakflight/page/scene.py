@@ -8,7 +8,6 @@ import viser
 from peakflight.limits import GRAVITY
 from peakflight.page import colours, shapes
 from peakflight.page.drawing import Drawing, Leg
-from peakflight.result import Plan
 
 PATH_WIDTH, GHOST_WIDTH = 5.0, 2.5
 """Pixels."""
@@ -73,7 +72,7 @@ class Scene:
         return f"grid at z = 0: cells of {cell:g} m, strong lines every {SECTION * cell:g} m"
 
     def draw_path(self, drawing: Drawing, *, fresh: bool = True) -> None:
-        """Draw the path of a plan; by speed if it is proven and of the course, else in one colour."""
+        """Draw the path of a plan: by speed if it is proven and of the course, else plain."""
         shown = drawing.colours
         if not drawing.plan.report.feasible:
             shown = np.broadcast_to(np.array(colours.REFUSED, dtype=np.uint8), shown.shape)
@@ -109,7 +108,10 @@ class Scene:
                 self._labels[index].text, self._labels[index].position = text, place
                 continue
             label = self._server.scene.add_label(
-                f"/legs/{index}", text, position=place, font_screen_scale=LABEL,
+                f"/legs/{index}",
+                text,
+                position=place,
+                font_screen_scale=LABEL,
                 anchor="center-center",
             )
             self._labels.append(label)
@@ -129,7 +131,7 @@ class Scene:
         self._rotors = scale * np.pad(np.array(vehicle.rotor_positions), ((0, 0), (0, 1)))
         self._arrows = self._server.scene.add_arrows(
             "/vehicle/thrusts",
-            self._arrow_points(np.full(4, vehicle.mass * GRAVITY / 4.0), drawing.plan),
+            self._arrow_points(np.full(4, vehicle.mass * GRAVITY / 4.0), drawing),
             colors=colours.THRUST,
             shaft_radius=0.045 * self._size,
             head_radius=0.12 * self._size,
@@ -142,11 +144,11 @@ class Scene:
             return
         position, attitude, thrusts = drawing.at(seconds)
         self._vehicle.position, self._vehicle.wxyz = position, attitude
-        self._arrows.points = self._arrow_points(thrusts, drawing.plan)
+        self._arrows.points = self._arrow_points(thrusts, drawing)
 
-    def _arrow_points(self, thrusts: np.ndarray, plan: Plan) -> np.ndarray:
+    def _arrow_points(self, thrusts: np.ndarray, drawing: Drawing) -> np.ndarray:
         """(4, 2, 3) m in the body frame; as long as the thrust is, over that of hovering."""
-        vehicle = Drawing(plan).flown
+        vehicle = drawing.flown
         lengths = ARROW * self._size * thrusts / (vehicle.mass * GRAVITY / 4.0)
         ends = self._rotors + np.maximum(lengths, 1e-3)[:, None] * np.array([0.0, 0.0, 1.0])
         return np.stack([self._rotors, ends], axis=1).astype(np.float32)

@@ -26,7 +26,7 @@ DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
 BRAND = (43, 108, 176)
 
 
-class _Server(viser.ViserServer):
+class _Server(viser.ViserServer):  # type: ignore[misc]
     """Without the share button of viser, which would go through a server elsewhere."""
 
     def request_share_url(self, verbose: bool = True) -> None:
@@ -37,7 +37,9 @@ class _Server(viser.ViserServer):
 class PageServer:
     """A page that is served, and the address that it has."""
 
-    def __init__(self, edited: Edited, *, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT) -> None:
+    def __init__(
+        self, edited: Edited, *, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT
+    ) -> None:
         """Serve a course.
 
         Raises

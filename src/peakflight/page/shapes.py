@@ -23,7 +23,7 @@ def ring() -> tuple[np.ndarray, np.ndarray]:
 
 
 def quadrotor(rotors: np.ndarray) -> tuple[trimesh.Trimesh, float]:
-    """A quadrotor as it looks, x forward, from (4, 2) places of its rotors in m; and its size, m."""
+    """A quadrotor, x forward, from (4, 2) places of its rotors in m; and its size, m."""
     arm = float(np.linalg.norm(rotors, axis=1).max())
     gaps = np.linalg.norm(rotors[:, None] - rotors[None], axis=-1)
     disc = 0.42 * float(gaps[gaps > 0.0].min())

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 from peakflight.errors import PeakflightError
+from peakflight.page.states import States, states
 from peakflight.problem import Problem
 from peakflight.result import Plan
 
@@ -38,6 +39,8 @@ class Answer:
 
     number: int
     plan: Plan | None = None
+    states: States | None = None
+    """What the vehicle does on it."""
     error: str = ""
     """Why there is no plan."""
     guess: float | None = None
@@ -82,13 +85,14 @@ def answer(request: Request) -> Answer:
         if request.guess:
             first = plan(request.problem, method="proportional")
             guess = first.duration if first.feasible else None
+        flown = states(found)
     except PeakflightError as error:
         return Answer(number=request.number, error=str(error))
     except Exception as error:  # a bug there must not end the page
         text = f"unexpected {type(error).__name__}: {error}; this is a bug"
         return Answer(number=request.number, error=text)
     seconds = time.perf_counter() - began
-    return Answer(number=request.number, plan=found, guess=guess, seconds=seconds)
+    return Answer(number=request.number, plan=found, states=flown, guess=guess, seconds=seconds)
 
 
 class _Noticing(logging.Handler):
@@ -108,6 +112,6 @@ def _send(replies: BinaryIO, value: Answer | Notice) -> None:
 
 
 if __name__ == "__main__":
-    from peakflight.page import solver  # so that what is pickled is of a module, not of __main__
+    from peakflight.page import solver  # noqa: PLW0406: what is pickled is not of __main__
 
     solver.main()
