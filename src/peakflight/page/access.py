@@ -83,11 +83,11 @@ def guarded(access: Access) -> Iterator[list[Any]]:
         started.append(first)
         return serve(*args, process_request=first, **options)
 
-    websockets.asyncio.server.serve = serve_guarded  # type: ignore[assignment, misc]
+    websockets.asyncio.server.serve = serve_guarded
     try:
         yield started
     finally:
-        websockets.asyncio.server.serve = serve  # type: ignore[misc]
+        websockets.asyncio.server.serve = serve
 
 
 def _named(host: str) -> str:

@@ -19,7 +19,7 @@ from peakflight.result import Plan
 QUIET = 0.2
 """Rest after which a course is planned in whole, s."""
 SWIFT = 0.12
-"""What a whole plan may take for drafts, which take about a third of that, to keep its pieces, s."""
+"""What a whole plan may take for drafts to keep its pieces, s; they take about a third of that."""
 SLUGGISH = 0.06
 """What a draft with all pieces may take before the next ones have one a leg, s."""
 PATIENCE, GRACE = 1.0, 0.2

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from peakflight.page import colours, shapes
-from peakflight.page.scene import size_of
+from peakflight.page.scene import size_of, together
 
 BALL, BALL_OF_LEG = 0.016, 0.22
 """Radius of a ball over the size of the course, and at most over a typical leg."""
@@ -131,23 +131,27 @@ class Handles:
     def _number(self) -> None:
         count = len(self._waypoints)
         every = 1 if count <= MOST_NUMBERS else 10
-        wanted = {*range(0, count, every), self._chosen, count - 1}
+        shared = together(self._waypoints, self._radius)
+        wanted = {shared[index][0] for index in (*range(0, count, every), self._chosen, count - 1)}
         for index in set(self._numbers) - wanted:
             self._numbers.pop(index).remove()
         lift = np.array([0.0, 0.0, 2.0 * self._radius])
         for index in wanted:
-            place = self._waypoints[index] + lift
+            place, text = self._waypoints[index] + lift, ", ".join(map(str, shared[index]))
             label = self._numbers.get(index)
             if label is None:
                 self._numbers[index] = self._server.scene.add_label(
                     f"/numbers/{index}",
-                    str(index),
+                    text,
                     position=place,
                     font_screen_scale=0.85,
                     anchor="bottom-center",
                 )
-            elif not np.array_equal(label.position, place):
+                continue
+            if not np.array_equal(label.position, place):
                 label.position = place
+            if label.text != text:
+                label.text = text
 
     async def _clicked(self, event: Any) -> None:
         if event.instance_index is not None:

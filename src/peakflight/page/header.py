@@ -60,8 +60,9 @@ def header(summary: Summary) -> str:
         f'<div><span data-total style="font-size:38px;font-weight:700;letter-spacing:-0.5px;'
         f'font-variant-numeric:tabular-nums;color:{colours.INK}">{time}</span>'
         f'<span style="font-size:16px;color:{colours.QUIET}"> s total</span></div>'
-        f'<span data-badge title="{escape(why, quote=True)}" style="background:{colour};color:white;'
-        f'border-radius:10px;padding:2px 10px;font-size:12.5px;font-weight:600;white-space:nowrap">'
+        f'<span data-badge title="{escape(why, quote=True)}" style="background:{colour};'
+        f'color:white;border-radius:10px;padding:2px 10px;font-size:12.5px;'
+        f'font-weight:600;white-space:nowrap">'
         f"{mark}{word}</span></div>",
     ]
     if plan is not None:
@@ -92,7 +93,7 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
         for leg in shown
     )
     return (
-        f'<div style="padding:0 12px;max-height:330px;overflow-y:auto">'
+        f'<div style="padding:0 12px;max-height:560px;overflow-y:auto">'
         f'<table data-legs style="width:100%;border-collapse:collapse;font-size:12.5px;'
         f'color:{colours.INK};font-variant-numeric:tabular-nums">'
         f'<tr style="text-align:left;color:{colours.QUIET}"><th>leg</th>'
@@ -112,7 +113,7 @@ def speed_legend(top: float) -> str:
     )
 
 
-RIGHT = "text-align:right;padding-right:10px"
+RIGHT = "text-align:right;padding-right:10px;white-space:nowrap"
 
 
 def _gain(duration: float, other: float | None, what: str) -> list[str]:

@@ -1,5 +1,6 @@
 """What a plan looks like in space: ground, path, the accepted one beside it, legs, the vehicle."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,10 @@ SEEN = 0.022
 """Size of the vehicle over that of the course, at least, so that it can be seen."""
 ARROW = 1.1
 """Length of a rotor's arrow as it hovers, over the vehicle's size."""
+MOST_TIMES = 3
+"""In one label."""
+NEAR = 0.03
+"""How far legs in one label may be apart, over the size of the course."""
 MOST_LEG_LABELS = 80
 """Legs that are labelled; of more, every so many."""
 LABEL = 0.8
@@ -94,12 +99,12 @@ class Scene:
         """Write time and nearest limit beside each leg; None takes the labels away."""
         texts, places = [], np.empty((0, 3))
         if drawing is not None:
-            every = -(-len(drawing.legs) // MOST_LEG_LABELS)
-            legs = drawing.legs[::every]
-            texts = [leg_text(leg) for leg in legs]
             times = drawing.plan.waypoint_times
-            middles = (times[:-1] + times[1:])[::every] / 2.0
-            places = drawing.plan.trajectory(middles)
+            middles = drawing.plan.trajectory((times[:-1] + times[1:]) / 2.0)
+            groups = sorted(set(together(middles, NEAR * size_of(middles))))
+            groups = groups[:: -(-len(groups) // MOST_LEG_LABELS)]
+            texts = [legs_text([drawing.legs[leg] for leg in group]) for group in groups]
+            places = middles[[group[0] for group in groups]]
         for label in self._labels[len(texts) :]:
             label.remove()
         del self._labels[len(texts) :]
@@ -177,6 +182,25 @@ def size_of(waypoints: np.ndarray) -> float:
     return max(float(np.linalg.norm(np.ptp(waypoints, axis=0))), 0.5)
 
 
-def leg_text(leg: Leg) -> str:
-    """What a leg's label says."""
-    return f"{leg.duration:.2f} s \u00b7 {leg.held[0].label}"
+def together(points: np.ndarray, distance: float) -> list[tuple[int, ...]]:
+    """(n,) for each of (n, 3) points all those that share a label with it: as near as this, m."""
+    groups: list[list[int]] = []
+    of: list[list[int]] = []
+    for index, point in enumerate(points):
+        firsts = points[[group[0] for group in groups]].reshape(-1, 3)
+        near = np.linalg.norm(firsts - point, axis=1) < distance
+        if near.any():
+            group = groups[int(near.argmax())]
+        else:
+            group = []
+            groups.append(group)
+        group.append(index)
+        of.append(group)
+    return [tuple(group) for group in of]
+
+
+def legs_text(legs: Sequence[Leg]) -> str:
+    """What the label of a leg says, or of several in one place."""
+    times = ", ".join(f"{leg.duration:.2f}" for leg in legs[:MOST_TIMES])
+    more = ", ..." if len(legs) > MOST_TIMES else ""
+    return f"{times}{more} s \u00b7 {legs[0].held[0].label}"

@@ -112,6 +112,6 @@ def _send(replies: BinaryIO, value: Answer | Notice) -> None:
 
 
 if __name__ == "__main__":
-    from peakflight.page import solver  # noqa: PLW0406: what is pickled is not of __main__
+    from peakflight.page import solver  # noqa: PLW0406 - what is pickled is not of __main__
 
     solver.main()
