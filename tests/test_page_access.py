@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from urllib.parse import urlsplit
@@ -23,6 +24,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from peakflight.page import Edited
+from peakflight.page.header import badge
 from peakflight.page.server import PageServer
 
 COURSE = pf.Course(np.array([[0.0, 0, 1], [2, 0, 1], [2, 2, 1.5]]))
@@ -104,6 +106,24 @@ def test_beyond_this_machine_the_token_is_needed(wide: PageServer) -> None:
     assert socket_status(wide, Cookie=cookie.split(";")[0]) == 101
     assert socket_status(wide, Cookie=cookie.split(";")[0], Origin="http://evil.example") == 403
     assert token not in repr(wide.access)
+
+
+def test_what_was_stopped_is_not_called_certified(
+    local: PageServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = local.page
+    end = time.monotonic() + 60.0
+    while badge(page.summary)[0] != "certified":
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    monkeypatch.setattr(page.planner, "ask", lambda edited, rests=True: None)  # nobody plans
+    page.limit("speed", 1.0, True)
+    assert page.thread.settle()
+    assert page.edited.problem.limits.speed == 1.0
+    assert badge(page.summary)[0] == "earlier plan"
+    page.undo()
+    assert page.thread.settle()
+    assert badge(page.summary)[0] == "certified"  # of what is drawn, and again what is edited
 
 
 def test_tokens_differ() -> None:

@@ -24,7 +24,7 @@ SLUGGISH = 0.06
 """What a draft with all pieces may take before the next ones have one a leg, s."""
 PATIENCE, GRACE = 1.0, 0.2
 """How long a draft, and a whole plan, may take when there is something newer, s; then it is
-stopped, and a process with it."""
+stopped, and a process with it, once another one is ready."""
 WARM_LEGS = 2
 """Legs of the course by which a new process is warmed up."""
 
@@ -84,6 +84,8 @@ class Planner:
         self._last: Plan | None = None
         self._single: Plan | None = None
         self._keeps = True
+        self._drafted_at = 0.0
+        self._spare_ready = False
         self._process = SolverProcess(self._hear)
         self._spare: SolverProcess | None = None
         self._thread = threading.Thread(target=self._run, name="peakflight planner", daemon=True)
@@ -149,6 +151,8 @@ class Planner:
             if self._spare is None:
                 self._spare = self._warmed(job.wish.edited)
             self._learn(job, answer)
+            if not job.whole:
+                self._drafted_at = time.perf_counter()
             self._shown(
                 Shown(
                     edited=job.wish.edited,
@@ -169,7 +173,8 @@ class Planner:
                 wish = self._wish
                 if wish is not None:
                     whole = self._is_whole(wish)
-                    wait = 0.0 if wish.rests or not whole else QUIET + wish.at - time.perf_counter()
+                    quiet = max(wish.at, self._drafted_at) + QUIET - time.perf_counter()
+                    wait = 0.0 if wish.rests or not whole else quiet
                     if wait <= 0.0 or (whole and not wish.drafted):
                         break
                     self._changed.wait(wait)
@@ -239,9 +244,9 @@ class Planner:
             while self._answer is None and not (self._closed or self._died or self._stop):
                 newer = self._wish is not None and self._wish.serial != job.wish.serial
                 left = job.began + (GRACE if job.whole else PATIENCE) - time.perf_counter()
-                if newer and left <= 0.0:
+                if newer and left <= 0.0 and self._spare_ready:
                     break
-                self._changed.wait(left if newer else None)
+                self._changed.wait(left if newer and left > 0.0 else None)
             answer, died = self._answer, self._died
             self._job = None
             if answer is not None or self._closed:
@@ -266,6 +271,7 @@ class Planner:
     def _warmed(self, edited: Edited) -> SolverProcess:
         """A process that has planned something alike, and so has loaded what that takes."""
         process = SolverProcess(self._hear)
+        self._spare_ready = False
         try:
             few = edited.problem.waypoints[: WARM_LEGS + 1]
             problem = replace(edited.problem, waypoints=few, derivatives={}, yaw=None)
@@ -280,6 +286,9 @@ class Planner:
             self._noticed(said.text)
             return
         with self._changed:
+            if process is self._spare and said is not None:
+                self._spare_ready = True
+                self._changed.notify_all()
             if process is not self._process:
                 return
             if said is None:

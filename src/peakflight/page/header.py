@@ -61,7 +61,7 @@ def header(summary: Summary) -> str:
         f'font-variant-numeric:tabular-nums;color:{colours.INK}">{time}</span>'
         f'<span style="font-size:16px;color:{colours.QUIET}"> s total</span></div>'
         f'<span data-badge title="{escape(why, quote=True)}" style="background:{colour};'
-        f'color:white;border-radius:10px;padding:2px 10px;font-size:12.5px;'
+        f"color:white;border-radius:10px;padding:2px 10px;font-size:12.5px;"
         f'font-weight:600;white-space:nowrap">'
         f"{mark}{word}</span></div>",
     ]

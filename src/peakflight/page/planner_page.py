@@ -35,6 +35,8 @@ BUSY_AFTER = 0.4
 """How long planning goes on before the page says so, s."""
 ON_PATH = 0.02
 """Angle between a click and the path that counts as on it, rad."""
+SLIDING = "limit"
+"""What gestures of sliders begin with: they end when the slider has rested."""
 PAUSE_AT_END = 0.8
 """Before the flight is played again, s."""
 
@@ -88,10 +90,10 @@ class Page:
         """What the header says."""
         shown, accepted = self._shown, self._accepted
         busy = self.planner.busy
+        follows = self._history.gesture != "" and not self.planner.idle
         return Summary(
             plan=self.drawn,
-            fresh=shown is not None
-            and (shown.edited is self.edited or self._history.gesture != ""),
+            fresh=shown is not None and (follows or shown.edited is self.edited),
             whole=shown is not None and shown.whole,
             error=self._error,
             busy=busy if busy is not None and busy > BUSY_AFTER else None,
@@ -188,7 +190,7 @@ class Page:
 
     def limit(self, name: str, value: float | None, moving: bool) -> None:
         """Set a limit, in SI units, or lift it."""
-        gesture = f"limit {name}" if moving else ""
+        gesture = f"{SLIDING} {name}" if moving else ""
         self._post(
             lambda: self._edit(lambda now: now.limit({name: value}), gesture, rests=not moving),
             key=gesture or None,
@@ -267,6 +269,7 @@ class Page:
             edited = change(self.edited)
         except PeakflightError as error:
             self._error = str(error)
+            self._handles.show(self.edited.waypoints, self._chosen)
             self._panel.show_edited(self.edited, self._chosen)
             self._show_header()
             return
@@ -393,6 +396,8 @@ class Page:
         if shown.whole and shown.edited is not self.edited:
             return  # of a course that has gone on since
         self._notice = ""
+        if shown.whole and self._history.gesture.startswith(SLIDING):
+            self._history = self._history.rest()
         guess = shown.guess
         if guess is None and self._shown is not None and not shown.whole:
             guess = self._shown.guess
