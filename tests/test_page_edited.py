@@ -99,7 +99,16 @@ def test_another_method_has_its_own_degree() -> None:
 def test_a_plan_is_taken_up_as_it_was_asked_for() -> None:
     plan = pf.plan(SQUARE, limits=pf.limits.PAPER_LIMITS, pieces=1)
     taken = Edited.of_plan(plan, "square")
-    assert pf.plan(taken.problem, pieces=1).duration == pytest.approx(plan.duration, rel=1e-9)
+    assert taken.options == {"pieces": 1}
+    again = pf.plan(taken.problem, method=taken.method, **taken.options)
+    assert again.duration == pytest.approx(plan.duration, rel=1e-9)
+
+
+def test_settings_of_a_plan_go_with_its_method() -> None:
+    plan = pf.plan(SQUARE, limits=pf.limits.PAPER_LIMITS, method="bry", time_penalty=2e4)
+    taken = Edited.of_plan(plan, "square")
+    assert taken.options == {"time_penalty": 2e4}
+    assert taken.plan_by(method="joint").options == {"pieces": "auto"}
 
 
 @given(st.lists(st.sampled_from(["move", "insert", "delete", "undo", "redo"]), max_size=30))

@@ -240,6 +240,12 @@ def test_flight_files_are_proven(to: str) -> None:
     assert name == pf.formats.FLIGHT_FORMATS[to].filename
 
 
+def test_the_report_is_that_of_the_command() -> None:
+    pytest.importorskip("plotly")
+    plan = pf.plan(edited().problem, pieces=1)
+    assert files.report(plan, "race").decode() == pf.report_html(plan, title="race")
+
+
 def test_the_thread_does_the_newest_under_a_key_and_survives_a_bug() -> None:
     failures: list[Exception] = []
     thread = PageThread(failures.append)

@@ -4,7 +4,7 @@ Each edit gives a `Problem` that is valid, or raises `InvalidProblem` and leaves
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self, TypeAlias
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from peakflight.course import Course
 from peakflight.errors import InvalidProblem
 from peakflight.limits import BOUNDING, KINDS, PAPER_LIMITS, ROTORS, Limits
-from peakflight.methods import DEFAULT_METHOD, METHODS
+from peakflight.methods import DEFAULT_METHOD, METHODS, find
 from peakflight.problem import Problem
 from peakflight.result import Plan
 from peakflight.vehicle import Vehicle
@@ -38,6 +38,8 @@ class Edited:
     """Weight of smoothness, of method joint."""
     name: str = "course"
     """What files are called."""
+    others: Mapping[str, Any] = field(default_factory=dict)
+    """Further settings of the method, from a plan file."""
 
     @classmethod
     def of_course(
@@ -56,7 +58,11 @@ class Edited:
         problem = plan.problem
         if problem.is_at_rest and not problem.derivatives:  # what the method had filled in
             problem = replace(problem, degree=None, continuity=None, start=None, end=None)
-        return cls(problem, method=method, name=name)
+        settings: Any = find(method).Settings
+        known = set(settings.__dataclass_fields__) - {"initial"}
+        others = {key: value for key, value in plan.settings.items() if key in known}
+        pieces, effort = others.pop("pieces", "auto"), others.pop("effort", 0.0)
+        return cls(problem, method, pieces, effort, name, others)
 
     @property
     def waypoints(self) -> np.ndarray:
@@ -81,9 +87,9 @@ class Edited:
     def options(self) -> dict[str, Any]:
         """What the method is told beside the problem."""
         if self.method != "joint":
-            return {}
+            return dict(self.others)
         effort = {"effort": self.effort} if self.effort else {}
-        return {"pieces": self.pieces, **effort}
+        return {**self.others, "pieces": self.pieces, **effort}
 
     def move(self, index: int, position: ArrayLike) -> Self:
         """Put a waypoint elsewhere, (3,) m."""
@@ -175,6 +181,8 @@ class Edited:
         if minimize is not None or (method is not None and method != self.method):
             cost = self.problem.minimize if minimize is None else minimize
             edited = edited._with(minimize=cost, degree=None, continuity=None)
+        if edited.method != method and method is not None:
+            edited = replace(edited, others={})
         return replace(
             edited,
             method=self.method if method is None else method,

@@ -3,6 +3,7 @@
 import json
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from peakflight.course import tidy
@@ -76,6 +77,13 @@ def plan_json(plan: Plan) -> bytes:
     return (json.dumps(plan.to_dict(), allow_nan=False) + "\n").encode()
 
 
+def report(plan: Plan, name: str) -> bytes:
+    """The report of a plan, as `peakflight report` writes it."""
+    from peakflight.reporting import report_html
+
+    return report_html(plan, title=name).encode()
+
+
 def flight_file(plan: Plan, to: str) -> tuple[str, bytes, ExportReport]:
     """Name and content of a flight file, and what was proven about it.
 
@@ -121,4 +129,4 @@ def _like(edited: Edited, like: Edited) -> Edited:
         minimize=like.problem.minimize,
         yaw=yaw,
     )
-    return Edited(problem, like.method, like.pieces, like.effort, edited.name)
+    return replace(like, problem=problem, name=edited.name)

@@ -96,7 +96,7 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
         f'<div style="padding:0 12px;max-height:560px;overflow-y:auto">'
         f'<table data-legs style="width:100%;border-collapse:collapse;font-size:12.5px;'
         f'color:{colours.INK};font-variant-numeric:tabular-nums">'
-        f'<tr style="text-align:left;color:{colours.QUIET}"><th>leg</th>'
+        f'<tr style="text-align:left;color:{colours.QUIET}"><th style="padding-right:6px">leg</th>'
         f'<th style="{RIGHT}">time (s)</th><th style="{RIGHT}">length (m)</th>'
         f"<th>held back by</th></tr>{rows}</table>{note}</div>"
     )

@@ -316,6 +316,11 @@ SAVES = (
         "course",
         "The waypoints: x, y, z in m, and yaw in rad if asked for.",
     ),
+    (
+        "Download a report (HTML)",
+        "report",
+        "One page that opens anywhere: plots to turn, tables, the proof. As peakflight report.",
+    ),
     ("Save the plan (plan.json)", "plan", "Everything, with the proof; peakflight check reads it."),
 )
 """Label, what is saved, hint."""

@@ -517,6 +517,9 @@ class _Saving:
                 else ("saved plan.json, which is not proven to keep the limits")
             )
             return "plan.json", files.plan_json(self._plan), said
+        if self._what == "report":
+            content = files.report(self._plan, stem)
+            return f"{stem}_report.html", content, f"saved {stem}_report.html"
         to = self._what.partition(":")[2]
         name, content, report = files.flight_file(self._plan, to)
         if not report.feasible:
