@@ -147,7 +147,7 @@ def _held(leg: Leg) -> str:
         nearest = leg.held[0]
         return (
             f'<span style="color:{colours.QUIET}">{escape(nearest.label)}, '
-            f"{100.0 * nearest.ratio:.0f} % of it</span>"
+            f"{100.0 * nearest.ratio:.1f} % of it</span>"
         )
     first, *others = reached
     text = f"<b>{escape(first.label)}</b> {_share(first)}"

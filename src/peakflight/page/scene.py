@@ -18,7 +18,7 @@ CELLS = 24
 """Of them across a course, at most."""
 SECTION = 5
 """Cells between stronger lines."""
-SEEN = 0.022
+SEEN = 0.03
 """Size of the vehicle over that of the course, at least, so that it can be seen."""
 ARROW = 1.1
 """Length of a rotor's arrow as it hovers, over the vehicle's size."""
