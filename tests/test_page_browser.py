@@ -1,6 +1,7 @@
 """The planner page in a real browser, with a real mouse."""
 
 import base64
+import math
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -42,7 +43,8 @@ class Visit:
 
     def total(self) -> float:
         """The time that is shown, s."""
-        return float(self.tab.inner_text("[data-total]"))
+        text = self.tab.inner_text("[data-total]").strip()
+        return math.nan if text == "\u2013" else float(text)
 
     def badge(self) -> str:
         return str(self.tab.inner_text("[data-badge]")).strip()
@@ -50,11 +52,16 @@ class Visit:
     def settled(self) -> None:
         """Wait until the course as it is has been planned in whole, and the browser shows it."""
         page = self.server.page
-        until(lambda: page.thread.settle() and page.planner.idle and page.summary.whole, "settled")
-        page.thread.settle()
-        plan = page.drawn
-        assert plan is not None
-        until(lambda: self.total() == round(plan.duration, 3), "the total is shown")
+
+        def shown() -> bool:
+            page.thread.settle()
+            summary = page.summary
+            if not (page.planner.idle and summary.whole and summary.fresh):
+                return False
+            assert summary.plan is not None
+            return self.total() == round(summary.plan.duration, 3)
+
+        until(shown, "the whole plan of the course as it is, in the browser")
 
     def pixel(self, point: np.ndarray) -> tuple[float, float]:
         """Where a point is on the screen."""
