@@ -28,8 +28,8 @@ REACH = 0.4
 GROWTH_BAR = 20.0
 """MB that all processes may grow by over the drags after the first tenth."""
 SEED = 8
-PATIENCE = 60.0
-"""s."""
+PATIENCE = 300.0
+"""s; the first plan of a quick run compiles."""
 
 LATENCY_COLUMNS: list[Column] = [
     ("limits", ""), ("legs", ",d"), ("moves", "d"), ("median [ms]", ".1f"), ("90 % [ms]", ".1f"),
