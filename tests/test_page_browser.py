@@ -112,7 +112,7 @@ class Visit:
         assert all(host.startswith("127.0.0.1") for host in self.hosts if host)
 
 
-def until(ready: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
+def until(ready: Callable[[], Any], what: str, seconds: float = 300.0) -> None:
     end = time.monotonic() + seconds
     while not ready():
         assert time.monotonic() < end, f"not in time: {what}"
