@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import peakflight as pf
 from peakflight.exporting.fit import held, stretched
+from peakflight.exporting.lifting import lowest
 from peakflight.exporting.writing import _cost_notes
 from peakflight.formats import FLIGHT_FORMATS, find_format, read_course
 from peakflight.formats.flight_files.flight_format import Reading, through_samples
@@ -373,6 +374,14 @@ def test_a_plan_is_lifted_from_the_ground(plan: pf.Plan, tmp_path: Path) -> None
     for lift in ("high", -1.0, float("nan"), True, None):
         words = rf"lift is .*{str(lift).rstrip('.0')}.*it must be auto or a number of m from 0 on"
         refused(words, under, tmp_path / "g", to="px4", lift=lift)
+
+
+@pytest.mark.parametrize("least", [0.0, 1e-310, 1e-20])
+def test_the_lowest_point_of_what_is_nearly_of_a_lower_degree(least: float) -> None:
+    """Roots divide by the coefficient that leads."""
+    coefficients = np.zeros((1, 8, 3))
+    coefficients[0, :, 2] = [1.0, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0, least]
+    assert lowest(pf.Trajectory(coefficients, [1.0])) == pytest.approx((0.75, 0.5), rel=1e-12)
 
 
 def test_drones_are_lifted_together(plan: pf.Plan, tmp_path: Path) -> None:

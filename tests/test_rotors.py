@@ -7,6 +7,8 @@ from decimal import Decimal, getcontext
 from fractions import Fraction
 from math import perm
 from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -26,13 +28,14 @@ from peakflight import (
     certify_plan,
     find_vehicle,
     plan,
+    planner,
     read_course,
     stretch_to_limits,
 )
 from peakflight.certificate import TOLERANCE, peak_ratios
 from peakflight.kernels import bounds, rotors
 from peakflight.limits import ROTORS, limited_values
-from peakflight.methods import METHODS
+from peakflight.methods import METHODS, Outcome, joint
 
 kernels = pytest.mark.kernels
 
@@ -356,13 +359,54 @@ def test_a_yaw_beside_limits_on_rotors_needs_to_know_what_steering_takes(yaw):
 
 def test_limits_about_another_airframe_than_the_vehicle_are_refused():
     racer = find_vehicle("racing-quad").on_rotors()
-    assert Problem(WAYPOINTS, vehicle=racer).limits == racer.limits
+    assert Problem(any_direction(0), vehicle=racer).limits == racer.limits
     other = replace(racer.limits, airframe=replace(racer.airframe, mass=0.4))
     with pytest.raises(InvalidProblem, match="vehicle racing-quad has Airframe"):
-        Problem(WAYPOINTS, vehicle=racer, limits=other)
+        Problem(any_direction(0), vehicle=racer, limits=other)
 
 
 @pytest.mark.parametrize("mass", [0.0, -1.0, math.nan, 1e-200, 10**400, "heavy", True])
 def test_an_airframe_that_makes_no_sense_is_refused(mass):
     with pytest.raises(InvalidProblem, match=r"^airframe mass is "):
         Airframe(mass=mass, inertia=1e-3, lever=0.1)
+
+
+# ---- other starts -----------------------------------------------------------------------------
+
+
+class Flown(NamedTuple):
+    """As much of a flight with its yaw as the planner looks at."""
+
+    trajectory: Trajectory
+    report: SimpleNamespace
+
+
+@pytest.mark.parametrize(
+    ("lasts", "tried"),
+    [
+        ({"guess": 5.05}, ["guess"]),
+        ({"guess": 7.0, "peak": 5.09}, ["guess", "peak"]),
+        ({"guess": 7.0, "peak": 9.0, "proportional": 6.0}, ["guess", "peak", "proportional"]),
+    ],
+)
+def test_where_the_yaw_slows_a_flight_much_other_starts_are_tried(monkeypatch, lasts, tried):
+    """Flights of 5 s, which last so long with their yaw."""
+    problem = Problem(any_direction(0), vehicle=find_vehicle("racing-quad").on_rotors())
+    begun = []
+
+    def reserving(method, problem, settings):
+        begun.append(settings.initial)
+        line = Trajectory(np.ones((1, 1, 3)), [lasts[settings.initial]])
+        outcome = Outcome(status=Status.SOLVED, trajectory=line, iterations=10)
+        return (outcome, Flown(line, SimpleNamespace(feasible=True))), 5.0
+
+    monkeypatch.setattr(planner, "_reserving", reserving)
+    outcome, flight = planner._answered("joint", problem, joint.Settings())
+    assert begun == tried
+    assert flight.trajectory.duration == min(lasts.values())
+    assert outcome.iterations == 10 * len(tried)
+    begun.clear()
+    free = Problem(any_direction(0), vehicle="racing-quad")
+    planner._answered("joint", free, joint.Settings())
+    planner._answered("joint", problem, joint.Settings(initial="guess", time_limit=0.0))
+    assert begun == ["guess", "guess"]

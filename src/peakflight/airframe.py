@@ -58,6 +58,12 @@ class Airframe:
                 f"airframe inertia_difference is {self.inertia_difference!r}; it must be from 0 to "
                 f"below the inertia, {self.inertia:g}"
             )
+        if self.inertia_difference > 0.0 and self.torque_per_thrust is None:
+            raise InvalidProblem(
+                f"airframe inertia_difference is {self.inertia_difference!r}; torque_per_thrust and "
+                "yaw_inertia must be given with it, since what it takes of the rotors follows from "
+                "them"
+            )
 
     def is_near(self, other: "Airframe") -> bool:
         """Whether two airframes are the same but for rounding."""
@@ -84,8 +90,7 @@ class Airframe:
         """(4,) c, delta, epsilon and chi of `kernels.rotors`.
 
         Reach, m; drag over mass, 1/s; and the collective acceleration that unequal inertia takes
-        from a rotor at worst where the thrust direction swings at 1 rad/s, m: 0 if nothing says
-        what a torque about z takes.
+        from a rotor at worst where the thrust direction swings at 1 rad/s, m.
         """
         across, along = self.drag
         crossed = 0.0

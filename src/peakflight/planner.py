@@ -30,6 +30,11 @@ EASED = 1.1
 """Thrust that is set aside then, over what was lacking."""
 ENOUGH = 1.003
 """A flight that the yaw makes longer by less than this factor is not solved again."""
+SLOWED = 1.02
+"""One that is in the end longer by more than this factor than it was without a yaw is looked for
+from other starts too."""
+OTHER_STARTS = ("peak", "proportional")
+"""These."""
 
 
 def plan(
@@ -157,17 +162,51 @@ def replan(
     return plan(replace(last.problem, **changes), method=last.method, **options)
 
 
-def _answered(method: str, problem: Problem, settings: Any) -> tuple[methods.Outcome, Steered]:
-    """Solve a problem and add its yaw.
+_Answer = tuple[methods.Outcome, Steered]
+
+
+def _answered(method: str, problem: Problem, settings: Any) -> _Answer:
+    """Solve a problem and add its yaw; where the yaw slows it much, from other starts too.
+
+    A flight past free fall may ask for more turning about its thrust than any rotors have, and
+    another flight, as fast, for none. A time limit is for all of it.
+    """
+    began = time.perf_counter()
+    limit = getattr(settings, "time_limit", None)
+    answers: list[_Answer] = []
+    for one in (settings, *_others(problem, settings)):
+        if answers and limit is not None:
+            rest = limit - (time.perf_counter() - began)
+            if rest <= 0.0:
+                break
+            one = replace(one, time_limit=rest)  # noqa: PLW2901
+        answer, promised = _reserving(method, problem, one)
+        answers.append(answer)
+        if answer[1].report.feasible and answer[1].trajectory.duration <= SLOWED * promised:
+            break
+    return _fastest(answers)
+
+
+def _others(problem: Problem, settings: Any) -> list[Any]:
+    """Settings under which a method may find another flight, if it has such."""
+    is_free = getattr(settings, "initial", None) == "guess"
+    if not (is_free and problem.limits.rotor_rooms and problem.is_at_rest):
+        return []
+    return [replace(settings, initial=start) for start in OTHER_STARTS]
+
+
+def _reserving(method: str, problem: Problem, settings: Any) -> tuple[_Answer, float]:
+    """Solve a problem and add its yaw; and how long the flight was before it had one, s.
 
     What turning about z takes of the rotors, the method does not know. Where they lack it, the
     problem is solved again within so much less of their range, from where it was if the method can
-    begin there, the last time anew, and the fastest flight is taken. A time limit is for all of it.
+    begin there, the last time anew, and the fastest flight is taken.
     """
     module = methods.find(method)
     began = time.perf_counter()
     narrow, limit = _spared(problem), getattr(settings, "time_limit", None)
     outcome = module.solve(narrow, settings)
+    promised = outcome.trajectory.duration
     answers = [_with_yaw(problem, outcome)]
     for left in range(RESERVES - 1, -1, -1):
         lacking = answers[-1][1].lacking
@@ -183,12 +222,18 @@ def _answered(method: str, problem: Problem, settings: Any) -> tuple[methods.Out
             settings = replace(settings, time_limit=rest)
         begin = _going_on(method, problem, settings, answers[-1]) if left else settings
         outcome = module.solve(narrow, begin)
-        outcome = replace(outcome, iterations=outcome.iterations + answers[-1][0].iterations)
         answers.append(_with_yaw(problem, outcome))
-    return min(
+    return _fastest(answers), promised
+
+
+def _fastest(answers: list[_Answer]) -> _Answer:
+    """The fastest flight, of the feasible ones if there are any, after what they all took."""
+    outcome, flight = min(
         answers,
         key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
     )
+    spent = sum(one.iterations for one, _ in answers)
+    return replace(outcome, iterations=spent), flight
 
 
 def _spared(problem: Problem) -> Problem:

@@ -15,6 +15,7 @@ from peakflight.trajectory import Trajectory
 AUTO = "auto"
 CLEARANCE = HEIGHT
 """m above the ground where `AUTO` puts the lowest point: where scripts hover before and after."""
+EPSILON = float(np.finfo(float).eps)
 RULE = f"it must be {AUTO} or a number of m from 0 on (peakflight edit --move goes down too)"
 
 
@@ -47,7 +48,8 @@ def lowest(flight: Trajectory) -> tuple[float, float]:
     found = [(float(flight(flight.end_time)[2]), flight.end_time)]
     for index in np.flatnonzero(reach <= begins.min()).tolist():
         z = np.polynomial.Polynomial(scaled[index])
-        slope = z.deriv().trim()
+        slope = z.deriv()
+        slope = slope.trim(EPSILON * np.abs(slope.coef).max())  # roots divide by what leads
         roots = slope.roots() if slope.degree() > 0 else np.empty(0)
         parts = np.concatenate(([0.0, 1.0], np.clip(np.real(roots), 0.0, 1.0)))
         heights = z(parts)

@@ -117,9 +117,8 @@ def _hurried() -> Iterator[None]:
     """Compiles sooner, to code as fast.
 
     Without collection of cyclic garbage: the compiler makes millions of objects, of which little is
-    garbage, and looking for it takes a tenth of its time. At LLVM's second level of optimisation,
-    which takes a twentieth less than the third; no method here was seen to run slower by it. A
-    level that the user has asked for stays.
+    garbage. And at LLVM's second level of optimisation in place of the third; `docs/benchmarks.md`
+    has what that saves, and that nothing runs slower by it. A level in NUMBA_OPT stays.
     """
     enabled = gc.isenabled()
     level = _config.OPT

@@ -278,7 +278,7 @@ def _runs(task: _Task, problem: Problem) -> list[_Run]:
         if runs[-1].objective > (1.0 - GAIN_OF_CUT) * last.objective:
             break
     if cuts and _is_short(task, runs[-1]):
-        runs.append(_exchanged(task, runs[-1]))
+        runs[-1:] = _exchanged(task, runs[-1])
     if runs[-1].ended and not runs[-1].solved:  # nothing to cut: only a rough run so far
         runs.append(_from(task, runs[-1], GOING_ON))
     return runs if has_stalled else runs + _again(task, runs[-1])
@@ -331,12 +331,14 @@ def _is_short(task: _Task, run: _Run) -> bool:
         return False
     if not (len(run.pieces) < most <= MOST_EXCHANGED and problem.is_at_rest):
         return False
+    if settings.exchanges == 0 or _may_miss(problem):  # samples do not say then what is faster
+        return False
     idle = idle_times(run.trajectory, problem.limits).sum()
     return bool(idle >= ENOUGH * settings.idle_tolerance * run.trajectory.duration)
 
 
-def _exchanged(task: _Task, run: _Run) -> _Run:
-    """A run with its pieces where they help most."""
+def _exchanged(task: _Task, run: _Run) -> list[_Run]:
+    """A run, and one with its pieces where they help more if there is such."""
     spent = 0
     settings = task.settings
 
@@ -351,7 +353,9 @@ def _exchanged(task: _Task, run: _Run) -> _Run:
 
     assert settings.max_pieces is not None
     found = exchanged(run, task.problem.limits, settings.max_pieces, settings.exchanges, solve)
-    return replace(found, iterations=spent)
+    if found is run:
+        return [replace(run, iterations=run.iterations + spent)]
+    return [run, replace(found, iterations=spent)]
 
 
 def _run(
