@@ -60,9 +60,8 @@ class Airframe:
             )
         if self.inertia_difference > 0.0 and self.torque_per_thrust is None:
             raise InvalidProblem(
-                f"airframe inertia_difference is {self.inertia_difference!r}; torque_per_thrust and "
-                "yaw_inertia must be given with it, since what it takes of the rotors follows from "
-                "them"
+                f"airframe inertia_difference is {self.inertia_difference!r}; torque_per_thrust "
+                "and yaw_inertia must be given with it: what it takes of the rotors follows from them"
             )
 
     def is_near(self, other: "Airframe") -> bool:
