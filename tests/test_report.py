@@ -225,6 +225,20 @@ class TestProof:
         assert float(joints["velocity"][1].split()[0]) >= 0.25
         assert "NOT certified" in words(page)
 
+    def test_proof_page_and_check_allow_the_same_miss(
+        self, made: pf.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        moved = WAYPOINTS + np.array([[0], [1e-3], [0], [0]]) * [0, 0, 1]
+        problem = dataclasses.replace(made.problem, waypoints=moved)
+        monkeypatch.setattr(pf.result, "WAYPOINT_TOLERANCE", 2.6e-4)
+        plan = dataclasses.replace(made, problem=problem)
+        said = words(reporting.report_html(plan))
+        assert "NOT certified" not in said
+        assert "1.0e-03 m at most, 1.0e-03 m is allowed" in said
+        plan.save(tmp_path / "plan.json")
+        checked = CliRunner().invoke(application, ["check", str(tmp_path / "plan.json")])
+        assert "(1.0e-03 m allowed)" in checked.stdout
+
     def test_a_false_claim_is_told(self, made: pf.Plan) -> None:
         claims = made.to_dict() | {"duration": 1.0}
         said = words(reporting.report_html(made, claims=claims))

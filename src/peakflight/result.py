@@ -22,6 +22,11 @@ WAYPOINT_TOLERANCE = 1e-9
 """Largest miss of a waypoint that counts as passed, relative to the size of the course (and m)."""
 
 
+def allowed_miss(waypoints: np.ndarray) -> float:
+    """Distance in m by which waypoints (n, axes) in m may be missed and still count as passed."""
+    return WAYPOINT_TOLERANCE * (1.0 + float(np.abs(waypoints).max()))
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Report:
     """What has been proven about a trajectory, from its coefficients alone."""

@@ -23,7 +23,7 @@ from peakflight.reporting.panels import limit_panels, yaw_panels
 from peakflight.reporting.path_plots import above_plot, path_plot
 from peakflight.reporting.plots import Plot
 from peakflight.reporting.themes import THEMES, style_sheet
-from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan
+from peakflight.result import JOINT_TOLERANCE, Plan, allowed_miss
 from peakflight.version import __version__
 from peakflight.wording import rotor_notes, seconds
 
@@ -250,7 +250,6 @@ def _certificate(findings: Findings) -> Iterator[str]:
     yield markup.paragraph(verdict, tone="good strong" if report.feasible else "bad strong")
     yield markup.points(report.problems, tone="bad")
     names = ", ".join(one.kind.label for one in findings.limits)
-    size = 1.0 + float(np.abs(plan.problem.waypoints).max())
     smooth = derivative_name(plan.problem.spline_class.continuity)
     rows = [
         (
@@ -266,7 +265,7 @@ def _certificate(findings: Findings) -> Iterator[str]:
         (
             "waypoints",
             f"missed by {report.waypoint_error:.1e} m at most, "
-            f"{WAYPOINT_TOLERANCE * size:.1e} m is allowed",
+            f"{allowed_miss(plan.problem.waypoints):.1e} m is allowed",
         ),
     ]
     if plan.problem.fixed:
