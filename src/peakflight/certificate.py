@@ -91,9 +91,8 @@ def certify(
             f"{derivative_name(order)} jumps at the end of segment {joint}, by {jump:.1e} of its "
             "size there"
         )
-    if waypoints is not None:
-        if not miss <= allowed_miss(points):
-            problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
+    if waypoints is not None and not miss <= allowed_miss(points):
+        problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
     state_error = 0.0
     for index in fixed or ():
         if waypoints is None or not 0 <= index <= len(firsts):

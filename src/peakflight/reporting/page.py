@@ -70,7 +70,7 @@ def report_page(findings: Findings, *, title: str, file: str) -> str:
     values = _without_infinity({"plots": plots, "themes": THEMES})
     # "<" is written so that no text ends the script that holds it
     data = json.dumps(values, allow_nan=False, separators=(",", ":"))
-    return _template().format(
+    page = _template().format(
         policy=POLICY,
         title=markup.text(f"{title}: {seconds(plan.duration)} s"),
         style=style_sheet(),
@@ -82,6 +82,8 @@ def report_page(findings: Findings, *, title: str, file: str) -> str:
         plotly=_plotly(),
         script=_resource("page.js"),
     )
+    # half of a pair of surrogates, which JSON and names of files may have, is no text
+    return page.encode(errors="replace").decode()
 
 
 def write_report(plan: Plan, path: PathLike, **options: Any) -> None:
