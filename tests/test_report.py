@@ -22,6 +22,7 @@ pytest.importorskip("plotly")
 
 from peakflight import reporting
 from peakflight.reporting import commands, panels, themes
+from peakflight.reporting.closeness import closeness
 from peakflight.wording import seconds
 
 TILT = math.radians(50)
@@ -224,6 +225,34 @@ class TestProof:
         joints = {row[0]: row for row in rows_of(page, "Joints")}
         assert float(joints["velocity"][1].split()[0]) >= 0.25
         assert "NOT certified" in words(page)
+
+    def test_each_kind_of_bound_has_its_own_closeness(
+        self, made: pf.Plan, on_rotors: pf.Plan
+    ) -> None:
+        plain = closeness(made.problem)
+        assert [line.split(": ")[0] for line in plain] == [
+            "speed, thrust acceleration, jerk, snap", "tilt", "yaw rate, yaw acceleration",
+        ]  # fmt: skip
+        assert plain[1] == "tilt: to 10⁻¹⁰ of the square of its tangent"
+        turned = words(reporting.report_html(on_rotors))
+        assert (
+            "rotor thrust, least rotor thrust, body rate about z, angular acceleration about z: "
+            "together with the yaw, to 10⁻⁶ of the limit or the value, whichever is larger; 10⁻⁴ "
+            "where rounding is in the way" in turned
+        )
+        assert "of its square" not in turned
+        airframe = dataclasses.replace(
+            on_rotors.problem.airframe, yaw_inertia=None, torque_per_thrust=None
+        )
+        limits = pf.Limits(airframe=airframe, rotor_thrust=0.15, least_rotor_thrust=0.02)
+        alone = dataclasses.replace(made.problem, limits=limits, yaw=None)
+        said = "rotor thrust, least rotor thrust: to 10⁻¹⁰ of the limit or the value, whichever "
+        assert closeness(alone)[-1] == said + "is larger; 10⁻⁷ where rounding is in the way"
+        limits = pf.Limits(speed=3.0, body_rate=3.0)
+        assert closeness(dataclasses.replace(made.problem, limits=limits, yaw=None)) == [
+            "speed: to 10⁻¹⁰ of the square",
+            "body rate: to 10⁻¹⁰ of the square, and what rounding can amount to",
+        ]
 
     def test_proof_page_and_check_allow_the_same_miss(
         self, made: pf.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
