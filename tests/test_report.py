@@ -22,6 +22,7 @@ pytest.importorskip("plotly")
 
 from peakflight import reporting
 from peakflight.reporting import commands, panels, themes
+from peakflight.reporting.closeness import closeness
 from peakflight.wording import seconds
 
 TILT = math.radians(50)
@@ -225,6 +226,48 @@ class TestProof:
         assert float(joints["velocity"][1].split()[0]) >= 0.25
         assert "NOT certified" in words(page)
 
+    def test_each_kind_of_bound_has_its_own_closeness(
+        self, made: pf.Plan, on_rotors: pf.Plan
+    ) -> None:
+        plain = closeness(made.problem)
+        assert [line.split(": ")[0] for line in plain] == [
+            "speed, thrust acceleration, jerk, snap", "tilt", "yaw rate, yaw acceleration",
+        ]  # fmt: skip
+        assert plain[1] == "tilt: to 10⁻¹⁰ of the square of its tangent"
+        turned = words(reporting.report_html(on_rotors))
+        assert (
+            "rotor thrust, least rotor thrust, body rate about z, angular acceleration about z: "
+            "together with the yaw, to 10⁻⁶ of the limit or the value, whichever is larger; 10⁻⁴ "
+            "where rounding is in the way" in turned
+        )
+        assert "of its square" not in turned
+        airframe = dataclasses.replace(
+            on_rotors.problem.airframe, yaw_inertia=None, torque_per_thrust=None
+        )
+        limits = pf.Limits(airframe=airframe, rotor_thrust=0.15, least_rotor_thrust=0.02)
+        alone = dataclasses.replace(made.problem, limits=limits, yaw=None)
+        said = "rotor thrust, least rotor thrust: to 10⁻¹⁰ of the limit or the value, whichever "
+        assert closeness(alone)[-1] == said + "is larger; 10⁻⁷ where rounding is in the way"
+        limits = pf.Limits(speed=3.0, body_rate=3.0)
+        assert closeness(dataclasses.replace(made.problem, limits=limits, yaw=None)) == [
+            "speed: to 10⁻¹⁰ of the square",
+            "body rate: to 10⁻¹⁰ of the square, and what rounding can amount to",
+        ]
+
+    def test_proof_page_and_check_allow_the_same_miss(
+        self, made: pf.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        moved = WAYPOINTS + np.array([[0], [1e-3], [0], [0]]) * [0, 0, 1]
+        problem = dataclasses.replace(made.problem, waypoints=moved)
+        monkeypatch.setattr(pf.result, "WAYPOINT_TOLERANCE", 2.6e-4)
+        plan = dataclasses.replace(made, problem=problem)
+        said = words(reporting.report_html(plan))
+        assert "NOT certified" not in said
+        assert "1.0e-03 m at most, 1.0e-03 m is allowed" in said
+        plan.save(tmp_path / "plan.json")
+        checked = CliRunner().invoke(application, ["check", str(tmp_path / "plan.json")])
+        assert "(1.0e-03 m allowed)" in checked.stdout
+
     def test_a_false_claim_is_told(self, made: pf.Plan) -> None:
         claims = made.to_dict() | {"duration": 1.0}
         said = words(reporting.report_html(made, claims=claims))
@@ -245,6 +288,15 @@ def test_texts_of_users_mean_nothing_to_a_browser(made: pf.Plan) -> None:
     assert reporting.report_html(plan).count("</script>") == page.count("</script>")
     broken = dataclasses.replace(plan, method=HOSTILE)
     assert "<img" not in without_plotly(reporting.report_html(broken))
+
+
+def test_what_is_no_text_is_replaced(made: pf.Plan, tmp_path: Path) -> None:
+    odd = "half \ud800 of one"
+    plan = dataclasses.replace(made, message=odd, version=odd, settings={"variant": odd})
+    path = tmp_path / "page.html"
+    reporting.write_report(plan, path, title=odd, file="plan-\udcff.json")
+    said = words(path.read_text(encoding="utf-8"))
+    assert said.count("half ? of one") == 4
 
 
 CASES: dict[str, dict[str, Any]] = {
@@ -294,11 +346,54 @@ def test_the_commands_make_the_same_plan(
     {"derivatives": {1: {"velocity": [1.0, 0.0, 0.0]}}},
     {"minimize": {"jerk": 1.0, "snap": 0.1}},
     {"vehicle": dataclasses.replace(pf.VEHICLES["crazyflie-2.1"], mass=0.03)},
+    {"limits": pf.Limits(speed=2.0, airframe=pf.VEHICLES["crazyflie-2.1"].airframe)},
 ])  # fmt: skip
 def test_no_command_is_better_than_a_wrong_one(options: dict[str, Any]) -> None:
-    plan = pf.plan(WAYPOINTS, limits=pf.Limits(speed=2.0), method="peak", **options)
+    plan = pf.plan(WAYPOINTS, **{"limits": pf.Limits(speed=2.0), "method": "peak", **options})
     assert commands.plan_command(plan, "plan.json") is None
     assert commands.plan_in_python(plan, "plan.json") is not None
+
+
+@pytest.mark.parametrize("settings", [
+    {"pieces=1)\nimport os\nprint(os.name": 1},
+    {"no_such_setting": 1},
+    {"pieces": [1, 2]},
+    {"pieces": "many"},
+    {"effort": type("Odd", (float,), {"__repr__": lambda self: "print(1)"})(1.0)},
+])  # fmt: skip
+def test_only_settings_of_the_method_are_typed_again(
+    made: pf.Plan, settings: dict[str, Any]
+) -> None:
+    plan = dataclasses.replace(made, settings=settings)
+    assert commands.plan_in_python(plan, "plan.json") is None
+    assert commands.plan_command(plan, "plan.json") is None
+    assert "pf.plan(" not in words(reporting.report_html(plan))
+
+
+def test_what_only_python_can_say(made: pf.Plan) -> None:
+    plan = dataclasses.replace(made, settings={"time_limit": None, "effort": True})
+    assert commands.plan_command(plan, "plan.json") is None
+    assert "time_limit=None, effort=True)" in commands.plan_in_python(plan, "plan.json")
+
+
+def test_a_plan_that_began_from_another_says_so(made: pf.Plan, tmp_path: Path) -> None:
+    pf.replan(made, waypoints=WAYPOINTS + 0.01).save(tmp_path / "plan.json")
+    plan = pf.Plan.load(tmp_path / "plan.json")
+    assert plan.settings == {"pieces": 2, "initial": "a plan"}
+    said = words(reporting.report_html(plan))
+    assert "pieces = 2, initial = a plan" in said
+    assert "Plan it again" not in said
+    assert "Prove it again" in said
+
+
+def test_numbers_of_numpy_are_typed_again_as_numbers() -> None:
+    options = {"pieces": np.int64(2), "effort": np.float64(1e-6)}
+    plan = pf.plan(WAYPOINTS, limits=LIMITS, **options)
+    assert {name: type(value) for name, value in plan.settings.items()} == {
+        "pieces": int, "effort": float,
+    }  # fmt: skip
+    assert "pieces=2, effort=1e-06)" in commands.plan_in_python(plan, "plan.json")
+    assert "--pieces 2 --effort 1e-06" in commands.plan_command(plan, "plan.json")
 
 
 def test_a_plan_that_no_method_made(hand_plan: Callable[..., pf.Plan]) -> None:
@@ -359,6 +454,16 @@ class TestCommand:
         assert result.stderr.count("\n") == 1
         assert data_of(Path("report.html").read_text())["plots"]
 
+    def test_texts_and_names_that_are_no_utf_8(
+        self, run: Callable[..., Result], made: pf.Plan
+    ) -> None:
+        values = made.to_dict() | {"message": "\ud800"}
+        Path("plan-\udcff.json").write_text(json.dumps(values))
+        result = run("plan-\udcff.json", "--json")
+        assert result.exit_code == 0, result.stderr
+        assert json.loads(result.stdout)["report"] == "report.html"
+        assert "<h1>plan-?</h1>" in Path("report.html").read_text(encoding="utf-8")
+
     def test_says_where_as_json(self, run: Callable[..., Result], tmp_path: Path) -> None:
         said = json.loads(run(tmp_path / "plan.json", "--json").stdout)
         assert Path(said["report"]) == tmp_path / "report.html"
@@ -401,6 +506,20 @@ class TestCommand:
             assert result.exit_code == 2
             assert result.stderr.count("\n") == 1
         assert [path.name for path in Path().iterdir()] == ["plan.json"]
+
+    def test_does_not_write_over_the_plan(self, run: Callable[..., Result]) -> None:
+        before = Path("plan.json").read_bytes()
+        Path("link.json").symlink_to("plan.json")
+        Path("report.html").hardlink_to("plan.json")
+        for arguments in (["-o", "plan.json"], ["-o", "./link.json"], []):
+            result = run("plan.json", *arguments)
+            assert result.exit_code == 2
+            assert "is the plan itself; name another file with -o" in result.stderr
+            assert result.stderr.count("\n") == 1
+        assert Path("plan.json").read_bytes() == before
+        result = run("plan.json", "-o", "n" * 300)
+        assert result.exit_code == 2
+        assert "cannot be written" in result.stderr
 
 
 def themed(value: Any, theme: dict[str, Any]) -> Any:

@@ -1022,6 +1022,11 @@ def test_the_plan_file_has_the_keys_of_the_contract(hand_plan, tmp_path):
         ({"peaks": 5}, r"a key has a value of the wrong kind"),
         ({"iterations": "many"}, ""),
         ({"pieces": None}, "key 'pieces' is missing"),
+        ({"settings": [1]}, "settings must be a JSON object"),
+        ({"settings": {"a=1)\nprint(": 1}}, r"there is a setting 'a=1\)\\nprint\('; no method"),
+        ({"settings": {"lambda": 1}}, "there is a setting 'lambda'; no method"),
+        ({"settings": {"pieces": [1]}}, r"setting pieces is '\[1\]'; it must be a finite number"),
+        ({"settings": {"effort": float("inf")}}, ""),
     ],
 )
 def test_plans_that_are_none_are_refused_with_the_file_and_the_reason(

@@ -16,7 +16,7 @@ from peakflight.kernels import bernstein, bounds, joints, rotors, turning
 from peakflight.kernels.jit import fresh
 from peakflight.limits import GRAVITY, KINDS, Limits
 from peakflight.problem import Problem, as_float_array, derivative_name
-from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
+from peakflight.result import JOINT_TOLERANCE, Plan, Report, allowed_miss
 from peakflight.trajectory import LONGEST, SHORTEST, Trajectory
 from peakflight.twist_certificate import certify_twist
 from peakflight.yaw_certificate import certify_yaw
@@ -91,10 +91,8 @@ def certify(
             f"{derivative_name(order)} jumps at the end of segment {joint}, by {jump:.1e} of its "
             "size there"
         )
-    if waypoints is not None:
-        tolerance = WAYPOINT_TOLERANCE * (1.0 + float(np.abs(points).max()))
-        if not miss <= tolerance:
-            problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
+    if waypoints is not None and not miss <= allowed_miss(points):
+        problems.append(f"waypoint {waypoint} is missed by {miss:.3g} m")
     state_error = 0.0
     for index in fixed or ():
         if waypoints is None or not 0 <= index <= len(firsts):

@@ -45,10 +45,10 @@ def write_atomically(path: PathLike, content: str | bytes) -> None:
     """
     path = Path(path)
     data = content.encode() if isinstance(content, str) else content
-    if path.is_dir():
-        raise InvalidFile(f"{path}: is a folder; name a file in it")
     temporary = None
     try:
+        if path.is_dir():
+            raise InvalidFile(f"{path}: is a folder; name a file in it")
         with tempfile.NamedTemporaryFile(
             dir=path.parent, prefix=f".{path.name}.", delete=False
         ) as stream:

@@ -14,7 +14,7 @@ from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
 from peakflight.problem import Problem, as_float_array
-from peakflight.result import Plan
+from peakflight.result import PLAIN, Plan
 from peakflight.steering import Steered, steered
 from peakflight.version import __version__
 from peakflight.yaw import as_heading
@@ -35,6 +35,8 @@ SLOWED = 1.02
 from other starts too."""
 OTHER_STARTS = ("peak", "proportional")
 """These."""
+BEGUN = "a plan"
+"""What a plan says of a setting that was another plan."""
 
 
 def plan(
@@ -282,12 +284,21 @@ def _with_yaw(problem: Problem, outcome: methods.Outcome) -> tuple[methods.Outco
 
 def _chosen(settings: Any) -> dict[str, Any]:
     """What differs from the defaults, as far as a file can hold it."""
-    values = {one.name: (getattr(settings, one.name), one.default) for one in fields(settings)}
+    values = {
+        one.name: (_plain(getattr(settings, one.name)), one.default) for one in fields(settings)
+    }
     return {
         name: value
         for name, (value, default) in values.items()
-        if isinstance(value, str | int | float) and value != default
+        if isinstance(value, PLAIN) and value != default
     }
+
+
+def _plain(value: Any) -> Any:
+    """A setting as a file can hold it: numbers of numpy as Python's; of a plan, that it is one."""
+    if isinstance(value, Plan):
+        return BEGUN
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _fields(kind: Any) -> set[str]:

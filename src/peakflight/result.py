@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from peakflight.errors import InvalidFile, InvalidProblem, Status
+from peakflight.errors import InvalidFile, InvalidProblem, Status, quoted
 from peakflight.files import PathLike, read_json, write_json
 from peakflight.problem import Problem, as_float_array
 from peakflight.trajectory import Trajectory
@@ -20,6 +21,14 @@ JOINT_TOLERANCE = 1e-8
 """Largest jump at a joint, relative to the derivative's size around it, that counts as smooth."""
 WAYPOINT_TOLERANCE = 1e-9
 """Largest miss of a waypoint that counts as passed, relative to the size of the course (and m)."""
+
+PLAIN = (str, int, float, bool, type(None))
+"""Types of settings that a plan file has: what a method takes beside, only Python can say."""
+
+
+def allowed_miss(waypoints: np.ndarray) -> float:
+    """Distance in m by which waypoints (n, axes) in m may be missed and still count as passed."""
+    return WAYPOINT_TOLERANCE * (1.0 + float(np.abs(waypoints).max()))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,7 +131,8 @@ class Plan:
     wall_time_s: float
     """Time that planning took, s."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """Settings of the method that are not its defaults, as far as they are numbers and names."""
+    """Settings of the method that are not its defaults, as far as they are numbers and names; for
+    a plan that it began from, that it was one."""
     message: str = ""
     """What the user should know: why there is no solution, what was merged, ..."""
     history: History | None = field(default=None, repr=False)
@@ -284,7 +294,7 @@ class Plan:
             pieces=pieces,
             iterations=int(values["iterations"]),
             wall_time_s=float(values["wall_time_s"]),
-            settings=dict(values.get("settings", {})),
+            settings=_checked_settings(values.get("settings", {})),
             message=str(values.get("message", "")),
             history=None if history is None else History(**history),
             yaw_motion=motion,
@@ -316,6 +326,23 @@ class Plan:
             return cls.from_dict(values)
         except InvalidProblem as error:
             raise InvalidFile(f"{Path(path)}: {error}") from None
+
+
+def _checked_settings(values: Any) -> dict[str, Any]:
+    """Settings of a method, whichever that is, from a plan file."""
+    if not isinstance(values, Mapping):
+        raise InvalidProblem("settings must be a JSON object")
+    for name, value in values.items():
+        if not (isinstance(name, str) and name.isidentifier()) or iskeyword(name):
+            raise InvalidProblem(
+                f"there is a setting {quoted(str(name))}; no method has one of that name"
+            )
+        if type(value) not in PLAIN or (isinstance(value, float) and not np.isfinite(value)):
+            raise InvalidProblem(
+                f"setting {name} is {quoted(str(value))}; it must be a finite number, a text, "
+                "true, false or null"
+            )
+    return dict(values)
 
 
 _REQUIRED = (

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from peakflight.claims import claims_feasible, false_claims
 from peakflight.cli.options import common_options, limits_option
@@ -17,7 +16,7 @@ from peakflight.errors import InvalidFile
 from peakflight.files import read_json
 from peakflight.limits import Limits
 from peakflight.problem import derivative_name
-from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan, Report
+from peakflight.result import JOINT_TOLERANCE, Plan, Report, allowed_miss
 from peakflight.summary import limit_summaries
 from peakflight.wording import rotor_notes, seconds
 
@@ -107,7 +106,6 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
         limit_rows(plan, report),
     )
     out.line()
-    points = plan.problem.waypoints
     out.pairs(
         [
             (
@@ -118,7 +116,7 @@ def _print(file: Path, plan: Plan, report: Report, false_claims: Sequence[str]) 
             (
                 "waypoints",
                 f"missed by {report.waypoint_error:.1e} m at most "
-                f"({WAYPOINT_TOLERANCE * (1.0 + float(np.abs(points).max())):.1e} m allowed)",
+                f"({allowed_miss(plan.problem.waypoints):.1e} m allowed)",
             ),
             (
                 "claims",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from peakflight.cli.inputs import keep_inputs
 from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
@@ -113,7 +114,7 @@ def export(
         progress.stage(f"reading {len(plans)} plan{'' if len(plans) == 1 else 's'}")
         read = [Plan.load(path) for path in plans]
         path = plans[0].parent / chosen.filename if output is None else output
-        _keep_inputs(path, plans)
+        keep_inputs(path, plans)
         if output is None and name == "json":
             _keep_other_plan(path, read[0])
         progress.stage(f"writing {chosen.filename}")
@@ -134,13 +135,6 @@ def export(
     if not report.feasible:
         click.echo(f"peakflight: {report.path}: {report.problems[0]}", err=True)
     return 0 if report.feasible else 1
-
-
-def _keep_inputs(path: Path, plans: Sequence[Path]) -> None:
-    """Refuse to write over what is read."""
-    for plan in plans:
-        if path.exists() and path.samefile(plan):
-            raise InvalidFile(f"{path}: is the plan itself; name another file with -o")
 
 
 def _keep_other_plan(path: Path, plan: Plan) -> None:

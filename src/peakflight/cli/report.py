@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from peakflight.cli.inputs import keep_inputs
 from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
@@ -45,13 +46,14 @@ def report(file: Path, output: Path | None, title: str | None, as_json: bool) ->
             plan = Plan.from_dict(values)
         except (ValueError, OverflowError) as error:
             raise InvalidFile(f"{file}: {error}") from None
+        path = output or file.parent / "report.html"
+        keep_inputs(path, [file])
         progress.stage("loading the planner")
         from peakflight.reporting import find, report_page
 
         progress.stage("proving it again")
         findings = find(plan, claims=values)
         progress.stage("drawing the page")
-        path = output or file.parent / "report.html"
         write_atomically(path, report_page(findings, title=title or _name(file), file=str(file)))
     wrong = [*findings.plan.report.problems, *findings.false_claims]
     if as_json:

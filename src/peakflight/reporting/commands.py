@@ -1,13 +1,15 @@
 """How a plan can be made, proven and reported again, as commands and as Python."""
 
 import shlex
+from dataclasses import fields
 from typing import Any
 
-from peakflight.limits import ROTORS, Limits
-from peakflight.methods import METHODS
+from peakflight.errors import InvalidProblem
+from peakflight.limits import KINDS, ROTORS
+from peakflight.methods import METHODS, find
 from peakflight.problem import Problem
 from peakflight.reporting.findings import is_rest
-from peakflight.result import Plan
+from peakflight.result import PLAIN, Plan
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES
 from peakflight.yaw import ABOUT, FIELDS, Heading
@@ -23,17 +25,19 @@ def plan_command(plan: Plan, file: str) -> str | None:
     """
     problem = plan.problem
     asked = _problem_options(problem)
-    if plan.method not in METHODS or asked is None or not set(plan.settings) <= set(OPTIONS):
+    if asked is None or not set(plan.settings) <= set(OPTIONS) or not _can_be_given(plan):
         return None
     words = ["peakflight", "plan", file, "--method", plan.method]
     for name, value in plan.settings.items():
+        if value is None or isinstance(value, bool):
+            return None
         words += [f"--{name.replace('_', '-')}", str(value)]
     return shlex.join([*words, *asked, "-o", "again"])
 
 
 def plan_in_python(plan: Plan, file: str) -> str | None:
-    """The lines that plan the same problem again; None if no method made the plan."""
-    if plan.method not in METHODS:
+    """The lines that plan the same problem again; None if no method does with these settings."""
+    if not _can_be_given(plan):
         return None
     options = {"method": plan.method, **plan.settings}
     given = "".join(f", {name}={value!r}" for name, value in options.items())
@@ -42,6 +46,27 @@ def plan_in_python(plan: Plan, file: str) -> str | None:
         f"plan = pf.Plan.load({file!r})\n"
         f"again = pf.plan(plan.problem{given})"
     )
+
+
+def _can_be_given(plan: Plan) -> bool:
+    """Whether a method made the plan, with settings that it takes as they are written.
+
+    Not if it began from another plan; and what a file says may be anything, so only names and
+    values that the method knows come into what is to be typed.
+    """
+    if plan.method not in METHODS:
+        return False
+    kind: Any = find(plan.method).Settings
+    known = {one.name for one in fields(kind) if isinstance(one.default, PLAIN)}
+    if not set(plan.settings) <= known:
+        return False
+    if not all(type(value) in PLAIN for value in plan.settings.values()):
+        return False
+    try:
+        kind(**plan.settings)
+    except InvalidProblem:
+        return False
+    return True
 
 
 def _problem_options(problem: Problem) -> list[str] | None:
@@ -64,7 +89,7 @@ def _problem_options(problem: Problem) -> list[str] | None:
 def _limit_options(problem: Problem) -> list[str] | None:
     limits, vehicle = problem.limits, problem.vehicle
     if not isinstance(vehicle, Vehicle):
-        return None if limits.on_rotors else ["--limits", _written(limits.to_dict())]
+        return None if limits.airframe else ["--limits", _written(limits.to_dict())]
     known = VEHICLES.get(vehicle.name)
     if known is None or _figures(known) != _figures(vehicle):
         return None
@@ -83,8 +108,8 @@ def _figures(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def _written(values: dict[str, Any]) -> str:
-    known = Limits.__dataclass_fields__
-    return ",".join(f"{name}={value!r}" for name, value in values.items() if name in known)
+    names = [kind.name for kind in KINDS if kind.name in values]
+    return ",".join(f"{name}={values[name]!r}" for name in names)
 
 
 def _yaw_options(yaw: Any) -> list[str] | None:

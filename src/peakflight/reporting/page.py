@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from peakflight.certificate import TOLERANCE
 from peakflight.files import PathLike, write_atomically
 from peakflight.problem import derivative_name
 from peakflight.reporting import markup, tables
+from peakflight.reporting.closeness import closeness, power_of_ten
 from peakflight.reporting.commands import plan_command, plan_in_python
 from peakflight.reporting.findings import Findings, find
 from peakflight.reporting.leg_plots import legs_plot
@@ -23,7 +23,7 @@ from peakflight.reporting.panels import limit_panels, yaw_panels
 from peakflight.reporting.path_plots import above_plot, path_plot
 from peakflight.reporting.plots import Plot
 from peakflight.reporting.themes import THEMES, style_sheet
-from peakflight.result import JOINT_TOLERANCE, WAYPOINT_TOLERANCE, Plan
+from peakflight.result import JOINT_TOLERANCE, Plan, allowed_miss
 from peakflight.version import __version__
 from peakflight.wording import rotor_notes, seconds
 
@@ -31,7 +31,6 @@ POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inli
     "img-src data: blob:"
 )
 """What a browser lets the page do: whatever is in it, and nothing that is elsewhere."""
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LIBRARIES = ("numpy", "numba", "plotly")
 """Whose versions the page names."""
 
@@ -70,7 +69,7 @@ def report_page(findings: Findings, *, title: str, file: str) -> str:
     values = _without_infinity({"plots": plots, "themes": THEMES})
     # "<" is written so that no text ends the script that holds it
     data = json.dumps(values, allow_nan=False, separators=(",", ":"))
-    return _template().format(
+    page = _template().format(
         policy=POLICY,
         title=markup.text(f"{title}: {seconds(plan.duration)} s"),
         style=style_sheet(),
@@ -82,6 +81,8 @@ def report_page(findings: Findings, *, title: str, file: str) -> str:
         plotly=_plotly(),
         script=_resource("page.js"),
     )
+    # half of a pair of surrogates, which JSON and names of files may have, is no text
+    return page.encode(errors="replace").decode()
 
 
 def write_report(plan: Plan, path: PathLike, **options: Any) -> None:
@@ -250,23 +251,22 @@ def _certificate(findings: Findings) -> Iterator[str]:
     yield markup.paragraph(verdict, tone="good strong" if report.feasible else "bad strong")
     yield markup.points(report.problems, tone="bad")
     names = ", ".join(one.kind.label for one in findings.limits)
-    size = 1.0 + float(np.abs(plan.problem.waypoints).max())
     smooth = derivative_name(plan.problem.spline_class.continuity)
     rows = [
         (
             "limits",
-            f"{names}: the largest value of each on every polynomial piece is bounded from above, "
-            f"to {_power(TOLERANCE)} of its square; nothing is sampled",
+            f"{names}: the largest value of each on every polynomial piece is bounded from above; "
+            "nothing is sampled",
         ),
         (
             "joints",
             f"smooth up to {smooth}: the largest jump is {report.joint_residual:.1e} of the size "
-            f"around it, {_power(JOINT_TOLERANCE)} is allowed",
+            f"around it, {power_of_ten(JOINT_TOLERANCE)} is allowed",
         ),
         (
             "waypoints",
             f"missed by {report.waypoint_error:.1e} m at most, "
-            f"{WAYPOINT_TOLERANCE * size:.1e} m is allowed",
+            f"{allowed_miss(plan.problem.waypoints):.1e} m is allowed",
         ),
     ]
     if plan.problem.fixed:
@@ -274,7 +274,7 @@ def _certificate(findings: Findings) -> Iterator[str]:
             (
                 "fixed motion",
                 f"off by {report.state_error:.1e} of its size at most at the waypoints where it is "
-                f"fixed, {_power(JOINT_TOLERANCE)} is allowed",
+                f"fixed, {power_of_ten(JOINT_TOLERANCE)} is allowed",
             )
         )
     rows.append(
@@ -284,6 +284,11 @@ def _certificate(findings: Findings) -> Iterator[str]:
         )
     )
     yield markup.pairs(rows)
+    yield markup.paragraph(
+        "How near the bounds of limits are to what is reached, unless a piece needs more "
+        "subdivisions than there are; a bound is never below:"
+    )
+    yield markup.points(closeness(plan.problem))
     yield tables.joint_table(findings)
 
 
@@ -314,11 +319,6 @@ def _made(plan: Plan, file: str) -> Iterator[str]:
         yield markup.code(python)
     yield markup.paragraph("Prove it again, and make this page again:")
     yield markup.code(f"peakflight check {quoted}\npeakflight report {quoted} -o report.html")
-
-
-def _power(value: float) -> str:
-    """A power of ten as people write it."""
-    return "10" + str(round(math.log10(value))).translate(RAISED)
 
 
 def _contents(sections: list[tuple[str, str, str]]) -> str:
