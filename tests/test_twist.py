@@ -495,7 +495,7 @@ def test_headings_that_make_no_sense(fields, words):
         ({"drag": (0.1, -0.1)}, "both must be from 0"),
         ({"drag": (0.1, math.nan)}, "both must be from 0"),
         ({"inertia_difference": 2e-3}, "below the inertia"),
-        ({"inertia_difference": 2e-4}, "torque_per_thrust and yaw_inertia must be given with it"),
+        ({"inertia_difference": 2e-4}, "and yaw_inertia must be given with it"),
         ({"inertia_difference": math.nan}, "must be from 0"),
         ({"inertia_difference": "x"}, "inertia_difference is 'x'; it must be a number"),
         ({"inertia_difference": True}, "it must be a number"),

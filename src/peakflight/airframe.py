@@ -61,7 +61,7 @@ class Airframe:
         if self.inertia_difference > 0.0 and self.torque_per_thrust is None:
             raise InvalidProblem(
                 f"airframe inertia_difference is {self.inertia_difference!r}; torque_per_thrust "
-                "and yaw_inertia must be given with it: what it takes of the rotors follows from them"
+                "and yaw_inertia must be given with it, to know what it takes of the rotors"
             )
 
     def is_near(self, other: "Airframe") -> bool:
