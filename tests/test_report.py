@@ -242,7 +242,10 @@ class TestProof:
         )
         assert "of its square" not in turned
         airframe = dataclasses.replace(
-            on_rotors.problem.airframe, yaw_inertia=None, torque_per_thrust=None
+            on_rotors.problem.airframe,
+            yaw_inertia=None,
+            torque_per_thrust=None,
+            inertia_difference=0.0,
         )
         limits = pf.Limits(airframe=airframe, rotor_thrust=0.15, least_rotor_thrust=0.02)
         alone = dataclasses.replace(made.problem, limits=limits, yaw=None)
