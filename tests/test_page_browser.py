@@ -63,8 +63,28 @@ class Visit:
 
         until(shown, "the whole plan of the course as it is, in the browser")
 
+    def view(self) -> dict[str, float]:
+        """Where the scene is on the screen: x, y, width and height in pixels."""
+        return max(
+            (one.bounding_box() for one in self.tab.locator("canvas").all() if one.is_visible()),
+            key=lambda box: box["width"] * box["height"],
+        )
+
+    def sees(self, points: np.ndarray) -> bool:
+        """Whether all of the points are on the screen, and large: by the camera as it reports."""
+        box = self.view()
+        places = self.pixels(points, box)
+        low = (places.min(axis=0) - (box["x"], box["y"])) / (box["width"], box["height"])
+        high = (places.max(axis=0) - (box["x"], box["y"])) / (box["width"], box["height"])
+        return bool(np.all(low > 0.05) and np.all(high < 0.95) and (high - low).max() > 0.6)
+
     def pixel(self, point: np.ndarray) -> tuple[float, float]:
         """Where a point is on the screen."""
+        x, y = self.pixels(point[None], self.view())[0]
+        return float(x), float(y)
+
+    def pixels(self, points: np.ndarray, box: dict[str, float]) -> np.ndarray:
+        """(n, 2), where (n, 3) points are on the screen; not a number behind the eye."""
         camera = self.client.camera
         w, x, y, z = camera.wxyz
         turn = np.array(
@@ -74,16 +94,11 @@ class Visit:
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ]
         )
-        right, down, ahead = turn.T @ (point - camera.position)
-        box = max(
-            (one.bounding_box() for one in self.tab.locator("canvas").all() if one.is_visible()),
-            key=lambda box: box["width"] * box["height"],
-        )
+        right, down, ahead = turn.T @ (points - camera.position).T
+        ahead = np.where(ahead > 0.0, ahead, np.nan)
         focal = box["height"] / 2.0 / np.tan(camera.fov / 2.0)
-        return (
-            box["x"] + box["width"] / 2.0 + focal * right / ahead,
-            box["y"] + box["height"] / 2.0 + focal * down / ahead,
-        )
+        middle = (box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0)
+        return middle + focal * np.column_stack([right / ahead, down / ahead])
 
     def drag(self, index: int, by: tuple[float, float], steps: int = 8) -> None:
         """Drag the ball of a waypoint by pixels."""
@@ -101,6 +116,9 @@ class Visit:
         self.tab.get_by_role("tab", name=tab).click()
 
     def picture(self, folder: Path, name: str) -> None:
+        for note in self.tab.get_by_text("Software WebGL rendering detected").all():
+            note.locator("xpath=ancestor::*[@role='alert']").get_by_role("button").click()
+            note.wait_for(state="detached")
         session = self.tab.context.new_cdp_session(self.tab)
         shot = session.send("Page.captureScreenshot", {"format": "png"})
         (folder / f"page_{name}.png").write_bytes(base64.b64decode(shot["data"]))
@@ -179,7 +197,7 @@ def test_a_limit_that_is_raised_makes_the_flight_faster(
     page = visit()
     before = page.total()
     page.open("Limits")
-    unit = page.tab.locator("label").filter(has_text=re.compile("^m/s$"))
+    unit = page.tab.locator("label").filter(has_text=re.compile(r"^at most \(m/s\)$"))
     box = unit.locator("xpath=ancestor::div[2]").locator("input[type=text]")
     box.fill("8")
     box.press("Enter")
@@ -247,9 +265,21 @@ def test_a_course_of_200_waypoints_is_still_edited_by_hand(
     steps = np.random.default_rng(3).normal(size=(200, 3)) * (1.5, 1.5, 0.2)
     waypoints = np.cumsum(steps, axis=0) + np.array([0.0, 0.0, 5.0])
     text = "x,y,z\n" + "\n".join(",".join(f"{x:.3f}" for x in row) for row in waypoints)
+    first = server.page.edited
+    until(lambda: page.sees(first.waypoints), "the small course is framed")
     server.page.load("long.csv", text.encode(), None)
     until(lambda: len(server.page.edited.waypoints) == 200, "loaded")
     page.settled()
+    until(lambda: page.sees(waypoints), "the large course is framed")
+    page.client.camera.position = page.client.camera.position + np.array([80.0, 0.0, 0.0])
+    until(lambda: not page.sees(waypoints), "someone looks elsewhere")
+    page.tab.get_by_role("button", name="Top").click()
+    until(lambda: page.sees(waypoints), "all is seen again")
+    eye = page.client.camera.position
+    assert np.all(np.abs(eye - waypoints.mean(axis=0))[:2] < np.ptp(waypoints, axis=0)[:2])
+    page.tab.get_by_role("button", name="Fit", exact=True).click()
+    until(lambda: page.client.camera.position[2] < eye[2] - 1.0, "from the side again")
+    until(lambda: page.sees(waypoints), "and all is seen")
     before = page.total()
     page.open("Course")
     page.tab.get_by_role("button", name="Delete it").click()
@@ -258,3 +288,8 @@ def test_a_course_of_200_waypoints_is_still_edited_by_hand(
     assert page.total() != before
     assert page.badge() == "✓ certified"
     page.picture(screenshots, "200_waypoints")
+    page.tab.get_by_role("button", name="Undo").click()
+    page.tab.get_by_role("button", name="Undo").click()
+    until(lambda: server.page.edited is first, "loading is undone")
+    page.settled()
+    until(lambda: page.sees(first.waypoints), "the first course is framed again")

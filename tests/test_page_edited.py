@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 
 import peakflight as pf
 from peakflight.page import Edited, History
-from peakflight.page.edited import nearest_leg, nearest_point
+from peakflight.page.placing import (
+    nearest_leg,
+    nearest_point,
+    place_after,
+    place_in_sight,
+)
 
 SQUARE = np.array([[0.0, 0, 1], [2, 0, 1], [2, 2, 1.5], [0, 2, 1]])
 
@@ -156,3 +161,35 @@ def test_a_line_of_sight_finds_the_leg_that_it_passes() -> None:
         assert angle < 1e-6
     behind = nearest_point(SQUARE, eye, eye - SQUARE[0])[1]
     assert behind > np.pi / 2
+
+
+@given(st.data())
+def test_what_an_edit_makes_is_the_same_course_and_what_is_loaded_another(
+    data: st.DataObject,
+) -> None:
+    now = edited()
+    if data.draw(st.booleans()):
+        now = Edited.of_course(pf.Course(SQUARE[:2]))
+    index = data.draw(st.integers(0, len(now.waypoints) - 1))
+    for edit in (
+        now.move(index, (7.0, 7.0, 7.0)),
+        now.insert(index, (7.0, 7.0, 7.0)),
+        now.append(),
+        now.reorder(index, 0),
+        now.limit({"speed": 3.0}),
+    ):
+        assert not edit.is_other_than(now)
+        assert not now.is_other_than(edit)
+    assert now.is_other_than(Edited.of_course(pf.Course(SQUARE + 1.0)))
+    assert now.is_other_than(Edited.of_course(pf.Course(np.vstack([SQUARE[:1], SQUARE + 9.0]))))
+
+
+def test_a_click_adds_to_the_leg_that_it_meets_or_at_the_end_on_the_level() -> None:
+    now, down = edited(), np.array([0.0, 0.0, -1.0])
+    place = place_in_sight(now, None, np.array([5.0, 5.0, 4.0]), down)
+    assert place.to == 4
+    assert np.array_equal(place.position, (5.0, 5.0, 1.0))  # as high as the last waypoint
+    up = place_in_sight(now, None, np.array([4.0, 1.0, 1.1]), np.array([-2.0, 0.0, 0.15]))
+    assert up.to == 2
+    assert np.array_equal(up.position, (2.0, 1.0, 1.25))
+    assert np.array_equal(place_after(now, None, 0).position, (1.0, 0.0, 1.0))

@@ -17,6 +17,7 @@ from peakflight.methods import DEFAULT_METHOD, METHODS, find
 from peakflight.problem import Problem
 from peakflight.result import Plan
 from peakflight.vehicle import Vehicle
+from peakflight.vehicles import find_vehicle
 from peakflight.yaw import Heading
 
 Pieces: TypeAlias = int | Literal["auto"]
@@ -91,6 +92,12 @@ class Edited:
         effort = {"effort": self.effort} if self.effort else {}
         return {**self.others, "pieces": self.pieces, **effort}
 
+    def is_other_than(self, before: Self) -> bool:
+        """Whether this is another course, and not an edit of one: few waypoints are the same."""
+        known = set(map(tuple, before.waypoints.tolist()))
+        same = sum(waypoint in known for waypoint in map(tuple, self.waypoints.tolist()))
+        return 2 * same < max(len(self.waypoints), len(before.waypoints))
+
     def move(self, index: int, position: ArrayLike) -> Self:
         """Put a waypoint elsewhere, (3,) m."""
         waypoints = self.waypoints.copy()
@@ -137,6 +144,33 @@ class Edited:
     def head(self, yaw: Heading | np.ndarray | None) -> Self:
         """Ask for another yaw along the whole flight; None for nothing."""
         return self._with(yaw=yaw)
+
+    def head_by(self, policy: str, angle: float, point: tuple[float, ...]) -> Self:
+        """Ask for a yaw by a policy of `Heading`, "waypoints", or "" for nothing.
+
+        Parameters
+        ----------
+        angle, point
+            rad, of policy "fixed", and (3,) m, of policy "point"; others do without.
+        """
+        if not policy:
+            return self.head(None)
+        if policy == "waypoints":
+            angles = self.angles
+            return self.head(np.zeros(len(self.waypoints)) if angles is None else angles)
+        if policy == "fixed":
+            return self.head(Heading(policy=policy, angle=angle))
+        if policy == "point":
+            x, y, z = point
+            return self.head(Heading(policy=policy, point=(x, y, z)))
+        return self.head(Heading(policy=policy))
+
+    def fly_named(self, name: str | None) -> Self:
+        """Let a preset fly, the user's own if that is its name, or nothing in particular."""
+        if name is None:
+            return self.fly(None)
+        own = self.vehicle
+        return self.fly(own if own is not None and own.name == name else find_vehicle(name))
 
     def fly(self, vehicle: Vehicle | None) -> Self:
         """Let something else fly, within its own limits; None keeps the limits that need none.
@@ -228,38 +262,3 @@ class Edited:
             if old in self.problem.derivatives and 0 < place < last
         }
         return self._with(waypoints=waypoints, derivatives=derivatives, yaw=self._yaw_with(angles))
-
-
-def nearest_leg(waypoints: np.ndarray, origin: ArrayLike, direction: ArrayLike) -> int:
-    """Which straight leg, of (n, 3) waypoints, a line of sight passes nearest to.
-
-    Parameters
-    ----------
-    origin, direction
-        (3,) m, and (3,) of any length.
-    """
-    eye, sight = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-    sight = sight / np.linalg.norm(sight)
-    shares = np.linspace(0.0, 1.0, LOOKS)[:, None]
-    points = waypoints[:-1, None] + shares * (waypoints[1:, None] - waypoints[:-1, None])
-    return int(np.argmin(_off_sight(points, eye, sight).min(axis=1)))
-
-
-def nearest_point(points: np.ndarray, origin: ArrayLike, direction: ArrayLike) -> tuple[int, float]:
-    """Index of the one of (n, 3) points that is nearest to a line of sight, and its angle, rad."""
-    eye, sight = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-    off = _off_sight(points, eye, sight / np.linalg.norm(sight))
-    index = int(np.argmin(off))
-    return index, float(off[index])
-
-
-def _off_sight(points: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(...,) rad between a line of sight and (..., 3) points."""
-    towards = points - origin
-    along = towards @ direction
-    across = np.linalg.norm(towards - along[..., None] * direction, axis=-1)
-    return np.arctan2(across, along)
-
-
-LOOKS = 65
-"""Points of a leg that are looked at."""

@@ -8,10 +8,11 @@ import numpy as np
 import viser
 
 from peakflight.page import colours
+from peakflight.page.camera import SIDES, USUAL
 from peakflight.page.drawing import Curve, Drawing
 from peakflight.page.header import speed_legend
 
-WIDTH = 370
+WIDTH = 320
 """Pixels."""
 PLOT_HEIGHT = 108
 HEADROOM = 1.12
@@ -39,6 +40,7 @@ class FlightPanel:
         sought: Callable[[float], None],
         paced: Callable[[float], None],
         viewed: Callable[[str, bool], None],
+        fitted: Callable[[str, viser.ClientHandle], None],
     ) -> None:
         self._server = server
         self._plots: dict[str, Any] = {}
@@ -60,6 +62,9 @@ class FlightPanel:
                 initial_value="1 \u00d7",
                 hint="How fast the flight is played.",
             )
+            view = server.gui.add_button_group(
+                "View", tuple(SIDES), hint="Show all of the course, to you alone. Key: F fits."
+            )
             with server.gui.add_folder("Show", expand_by_default=False):
                 for name, label, on, hint in VIEWS:
                     box = server.gui.add_checkbox(label, on, hint=hint)
@@ -70,8 +75,11 @@ class FlightPanel:
         self._play.on_click(_clicked(lambda: played(not self.playing)))
         self._slider.on_update(_from_client(sought))
         self._pace.on_update(_from_client(lambda value: paced(SPEEDS[value])))
+        view.on_click(_to_client(lambda event: fitted(event.target.value, event.client)))
         command = server.gui.add_command("Play or stop", hotkey="space")
         command.on_trigger(_clicked(lambda: played(not self.playing)))
+        command = server.gui.add_command("Fit view", hotkey="F")
+        command.on_trigger(_to_client(lambda event: fitted(USUAL, event.client)))
 
     def set_playing(self, playing: bool) -> None:
         """Say whether it plays."""
@@ -182,5 +190,15 @@ def _clicked(deed: Callable[[], None]) -> Callable[[Any], Any]:
     async def callback(event: Any) -> None:
         del event
         deed()
+
+    return callback
+
+
+def _to_client(deed: Callable[[Any], None]) -> Callable[[Any], Any]:
+    """A callback of what is done to whoever asks."""
+
+    async def callback(event: Any) -> None:
+        if event.client is not None:
+            deed(event)
 
     return callback

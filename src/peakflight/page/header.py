@@ -102,6 +102,15 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
     )
 
 
+def message(text: str, *, good: bool) -> str:
+    """What became of a file."""
+    colour = colours.GOOD if good else colours.BAD
+    return (
+        f'<div data-file style="margin:2px 12px;padding:6px 8px;border-left:3px solid {colour};'
+        f'color:{colour};font-size:12.5px;overflow-wrap:anywhere">{escape(text)}</div>'
+    )
+
+
 def speed_legend(top: float) -> str:
     """The scale of colours of the path."""
     middle = f"{top / 2.0:.3g}"

@@ -59,13 +59,14 @@ class LimitsPanel:
         self._sliders: dict[str, Any] = {}
         for kind in KINDS:
             given = RANGES[kind.name]
+            bound = "at least" if kind.name.startswith("least") else "at most"
             self._boxes[kind.name] = server.gui.add_checkbox(
                 f"{kind.label[0].upper()}{kind.label[1:]}",
                 False,
                 hint=f"{given.hint} Untick to lift.",
             )
             self._sliders[kind.name] = server.gui.add_slider(
-                plain_unit("°" if kind.unit == "rad" else kind.unit),
+                f"{bound} ({plain_unit('°' if kind.unit == 'rad' else kind.unit)})",
                 given.low,
                 given.high,
                 given.step,

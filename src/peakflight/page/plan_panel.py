@@ -12,12 +12,12 @@ from peakflight.formats import FLIGHT_FORMATS
 from peakflight.methods import METHODS
 from peakflight.page.drawing import Drawing
 from peakflight.page.edited import COSTS, Edited, Pieces
-from peakflight.page.header import Summary, header, legs_table
+from peakflight.page.header import Summary, header, legs_table, message
 from peakflight.page.limits_panel import LimitsPanel
 from peakflight.vehicles import VEHICLES
 from peakflight.yaw import Heading
 
-WIDTH = 390
+WIDTH = 360
 """Pixels."""
 NO_VEHICLE = "none, limits alone"
 PIECES: dict[str, Pieces] = {"where it pays": "auto", "1": 1, "2": 2, "3": 3, "4": 4, "6": 6}
@@ -244,9 +244,9 @@ class PlanPanel:
     def _explain(self, name: str) -> None:
         self._about.content = FLIGHT_FORMATS[name].summary
 
-    def say(self, html: str) -> None:
+    def say(self, text: str, *, good: bool) -> None:
         """Show what became of a file."""
-        self._message.content = html
+        self._message.content = message(text, good=good)
 
     def show_ground(self, text: str) -> None:
         """Say what the grid is."""

@@ -1,46 +1,37 @@
 """The page: what is edited, what is planned, and what of it is shown. All of it on one thread."""
 
-import logging
 import math
 import threading
-import time
 from collections.abc import Callable
-from html import escape
 from typing import Any
 
 import numpy as np
 import viser
 
 from peakflight.errors import PeakflightError
-from peakflight.page import colours, files
+from peakflight.page import files
 from peakflight.page.asking import Planner, Shown
+from peakflight.page.camera import Cameras
 from peakflight.page.drawing import Drawing
-from peakflight.page.edited import Edited, nearest_leg, nearest_point
+from peakflight.page.edited import Edited
 from peakflight.page.flight_panel import FlightPanel
 from peakflight.page.handles import Handles, Phase
 from peakflight.page.header import Summary
 from peakflight.page.history import History
+from peakflight.page.placing import Place, place_after, place_in_sight
 from peakflight.page.plan_panel import PlanPanel
+from peakflight.page.playback import Playback
+from peakflight.page.saving import Saving
 from peakflight.page.scene import Scene
 from peakflight.page.thread import PageThread
 from peakflight.result import Plan
-from peakflight.vehicles import find_vehicle
-from peakflight.yaw import Heading
 
 FRAME = 1.0 / 30.0
 """Between positions of the vehicle, s."""
-PLOT_FRAME = 1.0 / 12.0
-"""Between positions of the mark in the plots, s."""
 BUSY_AFTER = 0.4
 """How long planning goes on before the page says so, s."""
-ON_PATH = 0.02
-"""Angle between a click and the path that counts as on it, rad."""
 SLIDING = "limit"
 """What gestures of sliders begin with: they end when the slider has rested."""
-PAUSE_AT_END = 0.8
-"""Before the flight is played again, s."""
-
-_log = logging.getLogger("peakflight")
 
 
 class Page:
@@ -56,23 +47,25 @@ class Page:
         self._error = self._notice = ""
         self._views = {"legs": False, "accepted": True, "rings": True}
         self._adds_by_click = False
-        self._seconds, self._pace, self._playing, self._looked = 0.0, 1.0, False, 0.0
-        self._plotted = 0.0
-        self.latencies: list[float] = []
-        """From an edit to the redrawn path, s, of the last `LATENCIES` plans."""
         self.thread = PageThread(self._failed)
         self.planner = Planner(self._planned, self._noticed)
-        self._scene = Scene(server)
+        self._scene, self._cameras = Scene(server), Cameras(server)
         self._handles = Handles(server, moved=self.move, chose=self.choose)
         self._panel = PlanPanel(server, self)
         self._flight = FlightPanel(
-            server, played=self.play, sought=self.seek, paced=self.set_pace, viewed=self.view
+            server,
+            played=self.play,
+            sought=self.seek,
+            paced=self.set_pace,
+            viewed=self.view,
+            fitted=self.fit,
         )
+        self._playback = Playback(self._scene, self._flight)
         server.scene.on_click()(self._clicked(always=False))
         server.scene.on_click(modifier="cmd/ctrl")(self._clicked(always=True))
         self._closed = threading.Event()
         self._clock = threading.Thread(target=self._tick, name="peakflight clock", daemon=True)
-        self._post(lambda: self._begin(edited))
+        self._post(self._begin)
         self._clock.start()
 
     @property
@@ -176,9 +169,7 @@ class Page:
 
     def fly(self, name: str | None) -> None:
         """Let another vehicle fly."""
-        self._post(
-            lambda: self._edit(lambda now: now.fly(None if name is None else _known(now, name)))
-        )
+        self._post(lambda: self._edit(lambda now: now.fly_named(name)))
 
     def rotors_alone(self) -> None:
         """Limit the vehicle's rotors themselves."""
@@ -202,19 +193,25 @@ class Page:
 
     def head(self, policy: str, degrees: float, point: tuple[float, ...]) -> None:
         """Ask for another yaw."""
-        self._post(lambda: self._edit(lambda now: now.head(_heading(now, policy, degrees, point))))
+        self._post(
+            lambda: self._edit(lambda now: now.head_by(policy, math.radians(degrees), point))
+        )
 
     def play(self, on: bool) -> None:
         """Fly, or stop."""
-        self._post(lambda: self._play(on))
+        self._post(lambda: self._playback.play(on))
 
     def seek(self, seconds: float) -> None:
         """Look at another time, s."""
-        self._post(lambda: self._seek(seconds), key="seek")
+        self._post(lambda: self._playback.seek(seconds), key="seek")
 
     def set_pace(self, pace: float) -> None:
         """Play faster or slower than it is."""
-        self._pace = pace
+        self._post(lambda: self._playback.set_pace(pace))
+
+    def fit(self, side: str, client: viser.ClientHandle) -> None:
+        """Show all of the course to whoever asks, from a side."""
+        self._post(lambda: self._cameras.fit(self._extent(), client, side))
 
     def view(self, name: str, on: bool) -> None:
         """Show something, or not."""
@@ -225,19 +222,13 @@ class Page:
         self._post(lambda: self._load(name, content, client))
 
     def save(self, what: str, client: Any) -> None:
-        """Send a file to whoever asked for it; flight files take a while, so they have a thread."""
+        """Send a file to whoever asked for it."""
         plan, edited, fresh = self.drawn, self.edited, self.summary.fresh
-        deed = _Saving(self, what, plan if fresh else None, edited, client)
-        threading.Thread(target=deed.run, name="peakflight file", daemon=True).start()
+        Saving(self.say, what, plan if fresh else None, edited, client).start()
 
     def say(self, text: str, *, good: bool, client: Any = None) -> None:
         """Show what became of a file, to everyone, and to whoever asked as a notification."""
-        colour = colours.GOOD if good else colours.BAD
-        html = (
-            f'<div data-file style="margin:2px 12px;padding:6px 8px;border-left:3px solid {colour};'
-            f'color:{colour};font-size:12.5px;overflow-wrap:anywhere">{escape(text)}</div>'
-        )
-        self._post(lambda: self._panel.say(html))
+        self._post(lambda: self._panel.say(text, good=good))
         if client is not None and not good:
             client.add_notification("Refused", text, color="red", auto_close_seconds=12.0)
 
@@ -246,15 +237,30 @@ class Page:
     def _post(self, deed: Callable[[], None], key: object = None) -> None:
         self.thread.post(deed, key)
 
-    def _begin(self, edited: Edited) -> None:
-        """Show a course that was not there before."""
-        self._history, self._chosen = History(edited), min(1, len(edited.waypoints) - 1)
-        self._accepted = None
-        self._panel.show_ground(self._scene.set_ground(edited.waypoints))
+    def _begin(self) -> None:
+        """Show a course that was not there before, to everyone, and have it planned."""
+        edited = self.edited
+        self._chosen, self._error = min(1, len(edited.waypoints) - 1), ""
+        self._drawing = self._shown = self._accepted = None
+        self._scene.clear()
+        self._playback.clear()
+        self._lay_ground()
+        self._cameras.frame(edited.waypoints)
         self._handles.show(edited.waypoints, self._chosen, resize=True)
         self._panel.show_edited(edited, self._chosen)
         self._show_header()
         self.planner.ask(edited)
+
+    def _lay_ground(self) -> None:
+        """Draw the ground for the course as it is, if what is there does not suit it."""
+        text = self._scene.set_ground(self.edited.waypoints)
+        if text is not None:
+            self._panel.show_ground(text)
+
+    def _extent(self) -> np.ndarray:
+        """(n, 3) m, all that there is to look at."""
+        waypoints = self.edited.waypoints
+        return waypoints if self._drawing is None else np.vstack([waypoints, self._drawing.path])
 
     def _edit(
         self,
@@ -284,12 +290,16 @@ class Page:
         if history.present is self.edited:
             self._history = history
             return
+        before, edited = self.edited, history.present
         self._history, self._error = history, ""
-        edited = history.present
+        if edited.is_other_than(before):
+            self._begin()
+            return
         self.planner.ask(edited, rests=rests)
         self._chosen = min(self._chosen, len(edited.waypoints) - 1)
         self._handles.show(edited.waypoints, self._chosen)
         if rests:
+            self._lay_ground()
             self._panel.show_edited(edited, self._chosen)
         else:
             self._panel.show_chosen(edited, self._chosen)
@@ -299,6 +309,7 @@ class Page:
         self._edit(lambda now: now.move(index, position), f"move {index}", rests=False)
         self._history = self._history.rest()
         self.planner.rest()
+        self._lay_ground()
         self._panel.show_edited(self.edited, self._chosen)
         self._handles.show(self.edited.waypoints, self._chosen, resize=True)
 
@@ -309,16 +320,14 @@ class Page:
             self._panel.show_chosen(self.edited, index)
 
     def _insert_after(self) -> None:
-        """Add a waypoint in the middle of the next leg, on the path if there is one."""
-        index = self._chosen
-        if index == len(self.edited.waypoints) - 1:
+        """Add a waypoint in the middle of the next leg."""
+        if self._chosen == len(self.edited.waypoints) - 1:
             self._edit(lambda now: now.append(), choose=-1)
-            return
-        middle = self.edited.waypoints[index : index + 2].mean(axis=0)
-        plan = self.drawn
-        if plan is not None and len(plan.pieces) == len(self.edited.waypoints) - 1:
-            middle = plan.trajectory(plan.waypoint_times[index : index + 2].mean())
-        self._edit(lambda now: now.insert(index + 1, middle), choose=index + 1)
+        else:
+            self._add(place_after(self.edited, self._drawing, self._chosen))
+
+    def _add(self, place: Place) -> None:
+        self._edit(lambda now: now.insert(*place), choose=place.to)
 
     def _shift(self, by: int) -> None:
         to = self._chosen + by
@@ -329,29 +338,11 @@ class Page:
         async def callback(event: Any) -> None:
             if always or self._adds_by_click:
                 origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-                self._post(lambda: self._add(origin, direction))
+                self._post(
+                    lambda: self._add(place_in_sight(self.edited, self._drawing, origin, direction))
+                )
 
         return callback
-
-    def _add(self, origin: np.ndarray, direction: np.ndarray) -> None:
-        """Add a waypoint where a line of sight meets the path, or else at the end."""
-        edited, drawing = self.edited, self._drawing
-        if drawing is not None and len(drawing.plan.pieces) == len(edited.waypoints) - 1:
-            index, angle = nearest_point(drawing.path, origin, direction)
-            if angle < ON_PATH:
-                leg = index // ((len(drawing.path) - 1) // len(drawing.plan.pieces))
-                leg = min(leg, len(edited.waypoints) - 2)
-                self._edit(lambda now: now.insert(leg + 1, drawing.path[index]), choose=leg + 1)
-                return
-        height = edited.waypoints[-1, 2]
-        along = (height - origin[2]) / direction[2] if direction[2] else -1.0
-        if along > 0.0:
-            place = origin + along * direction
-            self._edit(lambda now: now.insert(len(now.waypoints), place), choose=-1)
-            return
-        leg = nearest_leg(edited.waypoints, origin, direction)
-        middle = edited.waypoints[leg : leg + 2].mean(axis=0)
-        self._edit(lambda now: now.insert(leg + 1, middle), choose=leg + 1)
 
     def _accept(self) -> None:
         if self._drawing is None or not self._drawing.plan.report.feasible:
@@ -375,10 +366,8 @@ class Page:
         except PeakflightError as error:
             self.say(str(error), good=False, client=client)
             return
-        self._error = ""
-        self._drawing = self._shown = None
-        self._scene.draw_ghost(None, visible=False)
-        self._begin(edited)
+        self._history = self._history.do(edited)
+        self._begin()
         count = len(edited.waypoints)
         self.say("; ".join((f"{name}: {count} waypoints", *notes)), good=True)
 
@@ -393,7 +382,8 @@ class Page:
 
     def _draw(self, shown: Shown) -> None:
         """Show a plan, if it is about what is edited or on the way there."""
-        if shown.whole and shown.edited is not self.edited:
+        of_present = shown.edited is self.edited
+        if not of_present and (shown.whole or shown.edited.is_other_than(self.edited)):
             return  # of a course that has gone on since
         self._notice = ""
         if shown.whole and self._history.gesture.startswith(SLIDING):
@@ -413,140 +403,25 @@ class Page:
         self._scene.draw_path(drawing)
         self._show_header()
         self._server.flush()
-        self._took(time.perf_counter() - shown.asked_at)
-        self._scene.set_vehicle(drawing)
-        self._seconds = min(self._seconds, shown.plan.duration)
-        self._scene.move_vehicle(drawing, self._seconds)
-        self._flight.show(drawing)
-        self._flight.plot(drawing, self._seconds)
+        self._playback.show(drawing)
         if shown.whole:
             self._panel.show_legs(drawing)
         if self._views["legs"]:
             self._scene.label_legs(drawing)
 
-    def _took(self, seconds: float) -> None:
-        self.latencies.append(seconds)
-        del self.latencies[:-LATENCIES]
-
     def _show_header(self) -> None:
         self._panel.show_header(self.summary)
-
-    def _play(self, on: bool) -> None:
-        if self._drawing is not None and on and self._seconds >= self._drawing.plan.duration:
-            self._seconds = 0.0
-        self._playing, self._looked = on, time.perf_counter()
-        self._flight.set_playing(on)
-
-    def _seek(self, seconds: float) -> None:
-        self._seconds = seconds
-        if self._drawing is not None:
-            self._scene.move_vehicle(self._drawing, seconds)
-            self._flight.plot(self._drawing, seconds)
 
     def _tick(self) -> None:
         """Wake the page while there is something that moves."""
         said = False
         while not self._closed.wait(FRAME):
-            if self._playing and self._server.get_clients():
-                self._post(self._advance, key="advance")
+            if self._playback.playing and self._server.get_clients():
+                self._post(self._playback.advance, key="advance")
             busy = self.planner.busy
             if (busy is not None and busy > BUSY_AFTER) or said:
                 said = busy is not None and busy > BUSY_AFTER
                 self._post(self._show_header, key="header")
 
-    def _advance(self) -> None:
-        """Fly on by a frame."""
-        now = time.perf_counter()
-        passed, self._looked = now - self._looked, now
-        drawing = self._drawing
-        if drawing is None or not self._playing:
-            return
-        self._seconds += self._pace * passed
-        if self._seconds > drawing.plan.duration + PAUSE_AT_END * self._pace:
-            self._seconds = 0.0
-        seconds = min(self._seconds, drawing.plan.duration)
-        self._scene.move_vehicle(drawing, seconds)
-        if now - self._plotted > PLOT_FRAME:
-            self._plotted = now
-            self._flight.set_time(seconds)
-            self._flight.plot(drawing, seconds)
-
     def _failed(self, error: Exception) -> None:
         self._error = f"unexpected {type(error).__name__}: {error}; this is a bug in the page"
-
-
-LATENCIES = 2000
-
-
-class _Saving:
-    """Making one file for one person."""
-
-    def __init__(
-        self, page: Page, what: str, plan: Plan | None, edited: Edited, client: Any
-    ) -> None:
-        self._page, self._what, self._plan = page, what, plan
-        self._edited, self._client = edited, client
-
-    def run(self) -> None:
-        """Make it and send it, or say why not."""
-        try:
-            name, content, said = self._made()
-        except PeakflightError as error:
-            self._page.say(str(error), good=False, client=self._client)
-            return
-        except Exception as error:  # a bug must be seen on the page, too
-            _log.exception("a file could not be made")
-            text = f"unexpected {type(error).__name__}: {error}; this is a bug"
-            self._page.say(text, good=False, client=self._client)
-            return
-        if self._client is not None:
-            self._client.send_file_download(name, content, save_immediately=True)
-        self._page.say(said, good=True)
-
-    def _made(self) -> tuple[str, bytes, str]:
-        """Name, content, and what is said about it."""
-        stem = self._edited.name
-        if self._what == "course":
-            return f"{stem}.csv", files.course_csv(self._edited), f"saved {stem}.csv"
-        if self._plan is None:
-            raise PeakflightError("there is no plan of the course as it is yet")
-        if self._what == "plan":
-            said = (
-                "saved plan.json"
-                if self._plan.report.feasible
-                else ("saved plan.json, which is not proven to keep the limits")
-            )
-            return "plan.json", files.plan_json(self._plan), said
-        if self._what == "report":
-            content = files.report(self._plan, stem)
-            return f"{stem}_report.html", content, f"saved {stem}_report.html"
-        to = self._what.partition(":")[2]
-        name, content, report = files.flight_file(self._plan, to)
-        if not report.feasible:
-            raise PeakflightError(f"{name}: not proven to keep the limits: {report.problems[0]}")
-        notes = "; ".join(("proven again as it is read", *report.notes))
-        return name, content, f"exported {name}: {notes}"
-
-
-def _known(now: Edited, name: str) -> Any:
-    """A vehicle by its name: a preset, or the user's own that is edited with."""
-    if now.vehicle is not None and now.vehicle.name == name:
-        return now.vehicle
-    return find_vehicle(name)
-
-
-def _heading(
-    now: Edited, policy: str, degrees: float, point: tuple[float, ...]
-) -> Heading | np.ndarray | None:
-    """What is asked of the yaw."""
-    if not policy:
-        return None
-    if policy == "waypoints":
-        angles = now.angles
-        return np.zeros(len(now.waypoints)) if angles is None else angles
-    if policy == "fixed":
-        return Heading(policy=policy, angle=math.radians(degrees))
-    if policy == "point":
-        x, y, z = point
-        return Heading(policy=policy, point=(x, y, z))
-    return Heading(policy=policy)

@@ -18,6 +18,10 @@ CELLS = 24
 """Of them across a course, at most."""
 SECTION = 5
 """Cells between stronger lines."""
+ASIDE, OUTGROWN = 0.5, 1.5
+"""How far a course may move, over its size, and how often it may be as large, on one ground."""
+AXES = 0.03
+"""Radius of the axes at the origin, which are as long as a cell, over that."""
 SEEN = 0.03
 """Size of the vehicle over that of the course, at least, so that it can be seen."""
 ARROW = 1.1
@@ -44,13 +48,27 @@ class Scene:
         self._arrows: viser.ArrowsHandle | None = None
         self._vehicle_key: tuple[Any, ...] = ()
         self._size = 1.0
+        self._ground: tuple[np.ndarray, float] | None = None
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
 
-    def set_ground(self, waypoints: np.ndarray) -> str:
-        """Draw the ground at z = 0 below a course, and look at it; returns what a cell is."""
+    def clear(self) -> None:
+        """Take away all that a plan says."""
+        for node in (self._path, self._ghost, self._vehicle):
+            if node is not None:
+                node.visible = False
+        self.label_legs(None)
+
+    def set_ground(self, waypoints: np.ndarray) -> str | None:
+        """Draw the ground at z = 0 below a course; what a cell is, or None if it stays."""
         low, high = waypoints.min(axis=0), waypoints.max(axis=0)
         centre, extent = (low + high) / 2.0, size_of(waypoints)
+        if self._ground is not None:
+            aside = float(np.linalg.norm(centre[:2] - self._ground[0]))
+            grown = extent / self._ground[1]
+            if aside < ASIDE * extent and 1.0 / OUTGROWN < grown < OUTGROWN:
+                return None
+        self._ground = (centre[:2], extent)
         cell = next((size for size in CELL_CHOICES if extent / size <= CELLS), CELL_CHOICES[-1])
         across = 3.0 * extent
         self._server.scene.add_grid(
@@ -68,12 +86,8 @@ class Scene:
             position=(*np.round(centre[:2] / (SECTION * cell)) * SECTION * cell, 0.0),
         )
         self._server.scene.add_frame(
-            "/axes", axes_length=1.5 * cell, axes_radius=0.03 * cell, origin_radius=0.06 * cell
+            "/axes", axes_length=cell, axes_radius=AXES * cell, origin_radius=AXES * cell
         )
-        camera = self._server.initial_camera
-        target = np.array([*centre[:2], 0.3 * centre[2]])
-        camera.look_at = tuple(target)
-        camera.position = tuple(target + extent * np.array([-0.28, -0.8, 0.68]))
         return f"grid at z = 0: cells of {cell:g} m, strong lines every {SECTION * cell:g} m"
 
     def draw_path(self, drawing: Drawing, *, fresh: bool = True) -> None:
@@ -93,7 +107,6 @@ class Scene:
             return
         grey = np.broadcast_to(np.array(colours.GHOST, dtype=np.uint8), drawing.segments.shape)
         self._ghost = self._lines("/accepted", self._ghost, drawing.segments, grey, GHOST_WIDTH)
-        self._ghost.visible = True
 
     def label_legs(self, drawing: Drawing | None) -> None:
         """Write time and nearest limit beside each leg; None takes the labels away."""
@@ -126,6 +139,7 @@ class Scene:
         vehicle = drawing.flown
         key = (vehicle.rotor_positions, round(size_of(drawing.plan.problem.waypoints), 1))
         if key == self._vehicle_key:
+            self._vehicle.visible = True
             return
         self._vehicle_key = key
         mesh, size = shapes.quadrotor(np.array(vehicle.rotor_positions))
@@ -173,7 +187,7 @@ class Scene:
                 name, points, shown, thickness=width, thickness_units="screen"
             )
         with self._server.atomic():
-            lines.points, lines.colors = points, shown
+            lines.points, lines.colors, lines.visible = points, shown, True
         return lines
 
 
