@@ -13,7 +13,7 @@ import viser
 from peakflight.page import colours, shapes
 from peakflight.page.scene import size_of, together
 
-BALL, BALL_OF_LEG = 0.016, 0.22
+BALL, BALL_OF_LEG = 0.016, 0.14
 """Radius of a ball over the size of the course, and at most over a typical leg."""
 RING = 2.6
 """Radius of a ring over that of a ball."""

@@ -20,9 +20,9 @@ SECTION = 5
 """Cells between stronger lines."""
 ASIDE, OUTGROWN = 0.5, 1.5
 """How far a course may move, over its size, and how often it may be as large, on one ground."""
-AXES = 0.03
+AXES = 0.02
 """Radius of the axes at the origin, which are as long as a cell, over that."""
-SEEN = 0.03
+SEEN = 0.022
 """Size of the vehicle over that of the course, at least, so that it can be seen."""
 ARROW = 1.1
 """Length of a rotor's arrow as it hovers, over the vehicle's size."""
