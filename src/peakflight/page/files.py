@@ -15,12 +15,18 @@ from peakflight.result import Plan
 
 LARGEST = 20_000_000
 """Bytes of an upload."""
+UPLOAD = "upload"
+"""What an upload is called here, whatever its name was elsewhere."""
 MOST_WAYPOINTS = 2000
 """What a page can show and plan while one waits."""
 
 
-def load(path: Path, like: Edited | None = None) -> tuple[Edited, tuple[str, ...]]:
+def load(
+    path: Path, like: Edited | None = None, name: str | None = None
+) -> tuple[Edited, tuple[str, ...]]:
     """What a file asks for: of a course, flown and planned as `like`; of a plan, as it says.
+
+    `name` is what its owner calls it, if that is not its path.
 
     Raises
     ------
@@ -31,9 +37,8 @@ def load(path: Path, like: Edited | None = None) -> tuple[Edited, tuple[str, ...
         raise InvalidFile(f"{path}: has {path.stat().st_size / 1e6:.0f} MB; the page takes 20")
     notes: tuple[str, ...] = ()
     if _is_plan(path):
-        edited = Edited.of_plan(
-            Plan.load(path), path.parent.name if path.stem == "plan" else path.stem
-        )
+        within = path.parent.name if name is None and path.stem == "plan" else path.stem
+        edited = Edited.of_plan(Plan.load(path), within)
     else:
         course = read_course(path)
         try:
@@ -43,6 +48,8 @@ def load(path: Path, like: Edited | None = None) -> tuple[Edited, tuple[str, ...
         edited = Edited.of_course(course)
         if like is not None:
             edited = _like(edited, like)
+    if name is not None:
+        edited = replace(edited, name=Path(name).stem or edited.name)
     if len(edited.waypoints) > MOST_WAYPOINTS:
         raise InvalidFile(
             f"{path}: has {len(edited.waypoints)} waypoints; the page takes {MOST_WAYPOINTS} "
@@ -53,13 +60,14 @@ def load(path: Path, like: Edited | None = None) -> tuple[Edited, tuple[str, ...
 
 def load_upload(name: str, content: bytes, like: Edited) -> tuple[Edited, tuple[str, ...]]:
     """The same of what was uploaded; messages call it as its owner does."""
+    called = name.replace("\\", "/").rpartition("/")[2] or UPLOAD
     with _folder() as folder:
-        path = _in(folder, name)
+        path = Path(folder) / UPLOAD
+        path.write_bytes(content)
         try:
-            path.write_bytes(content)
-            return load(path, like)
+            return load(path, like, called)
         except PeakflightError as error:
-            raise InvalidFile(str(error).replace(f"{folder}/", "")) from None
+            raise InvalidFile(str(error).replace(str(path), called)) from None
 
 
 def course_csv(edited: Edited) -> bytes:
@@ -93,7 +101,7 @@ def flight_file(plan: Plan, to: str) -> tuple[str, bytes, ExportReport]:
         As `peakflight.export`.
     """
     with _folder() as folder:
-        path = _in(folder, FLIGHT_FORMATS[to].filename)
+        path = Path(folder) / FLIGHT_FORMATS[to].filename
         report = export(plan, to=to, path=path)
         return path.name, path.read_bytes(), report
 
@@ -101,11 +109,6 @@ def flight_file(plan: Plan, to: str) -> tuple[str, bytes, ExportReport]:
 _folder: Callable[[], tempfile.TemporaryDirectory[str]] = lambda: tempfile.TemporaryDirectory(  # noqa: E731
     prefix="peakflight-page-"
 )
-
-
-def _in(folder: str, name: str) -> Path:
-    """A file of a folder, whatever its name was elsewhere."""
-    return Path(folder) / (Path(name.replace("\\", "/")).name.lstrip(".") or "upload")
 
 
 def _is_plan(path: Path) -> bool:

@@ -8,7 +8,7 @@ from peakflight.page.drawing import Held, Leg
 from peakflight.result import Plan
 
 MOST_ROWS = 250
-"""Legs in the table; the binding ones of more come first."""
+"""Legs in the table: of more, the first."""
 SMALL = f"font-size:12px;line-height:1.45;color:{colours.QUIET}"
 
 
@@ -20,10 +20,16 @@ class Summary:
     """What is drawn; the badge is computed from its report and nothing else."""
     fresh: bool
     """Whether that answers the course as it is."""
+    follows: bool = False
+    """Whether it answers what the course was a moment ago, while something is dragged."""
+    pending: bool = False
+    """Whether an answer is on its way."""
     whole: bool
     """Whether it is the last word; else a draft."""
     error: str = ""
     """Why there is no plan of the course as it is."""
+    refused: str = ""
+    """Why the last change was not made."""
     busy: float | None = None
     """How long planning has been going on, s."""
     notice: str = ""
@@ -44,9 +50,17 @@ def badge(summary: Summary) -> tuple[str, str, str]:
     if not plan.report.feasible:
         why = plan.message or "; ".join(plan.report.problems)
         return "not certified", colours.BAD, why
-    if summary.error or not summary.fresh:
-        return "earlier plan", colours.QUIET, "what is drawn does not answer the course as it is"
-    return "certified", colours.GOOD, "every limit is proven, not sampled"
+    if summary.fresh:
+        return "certified", colours.GOOD, "every limit is proven, not sampled"
+    if summary.follows:
+        return (
+            "draft, proven",
+            colours.QUIET,
+            "what is drawn is proven, and follows what is dragged",
+        )
+    if summary.pending:
+        return "planning", colours.BUSY, "what is drawn answers the course before the last change"
+    return EARLIER, colours.QUIET, "what is drawn does not answer the course as it is"
 
 
 def header(summary: Summary) -> str:
@@ -70,8 +84,8 @@ def header(summary: Summary) -> str:
         gains += _gain(plan.duration, summary.accepted, "the accepted plan")
         lines.append(f'<div style="{SMALL}">{"<br>".join(gains) or "&nbsp;"}</div>')
     lines.append(f'<div data-state style="{SMALL}">{_state(summary)}</div>')
-    if summary.error or (why and word == "not certified"):
-        text = escape(summary.error or why)
+    if summary.error or summary.refused or (why and word == "not certified"):
+        text = escape(summary.refused or summary.error or why)
         lines.append(
             f'<div data-error style="margin-top:4px;padding:6px 8px;border-left:3px solid '
             f'{colours.BAD};background:#fdf1f0;color:{colours.BAD};font-size:12.5px">{text}</div>'
@@ -102,6 +116,16 @@ def legs_table(legs: tuple[Leg, ...]) -> str:
     )
 
 
+def course_line(name: str, count: int, length: float) -> str:
+    """What is edited, and how."""
+    return (
+        f'<div style="padding:2px 12px;font-size:13.5px;line-height:1.5;color:{colours.INK};'
+        f'overflow-wrap:anywhere"><b>{escape(name)}</b>: {count} waypoints, {length:.1f} m. Drag a '
+        "ball: it stays at its height; with Shift, up and down. The arrows move the chosen one "
+        "along an axis.</div>"
+    )
+
+
 def message(text: str, *, good: bool) -> str:
     """What became of a file."""
     colour = colours.GOOD if good else colours.BAD
@@ -122,6 +146,7 @@ def speed_legend(top: float) -> str:
     )
 
 
+EARLIER = "earlier plan"
 RIGHT = "text-align:right;padding-right:10px;white-space:nowrap"
 
 

@@ -79,13 +79,7 @@ class LimitsPanel:
 
     def show(self, edited: Edited) -> None:
         """Set boxes and sliders to the limits of what is edited."""
-        before, self._edited = self._edited, edited
-        if (
-            before is not None
-            and before.problem.limits == edited.problem.limits
-            and (before.vehicle is edited.vehicle)
-        ):
-            return
+        self._edited = edited
         for kind in KINDS:
             value = getattr(edited.problem.limits, kind.name)
             box, slider = self._boxes[kind.name], self._sliders[kind.name]

@@ -12,7 +12,7 @@ from peakflight.formats import FLIGHT_FORMATS
 from peakflight.methods import METHODS
 from peakflight.page.drawing import Drawing
 from peakflight.page.edited import COSTS, Edited, Pieces
-from peakflight.page.header import Summary, header, legs_table, message
+from peakflight.page.header import Summary, course_line, header, legs_table, message
 from peakflight.page.limits_panel import LimitsPanel
 from peakflight.vehicles import VEHICLES
 from peakflight.yaw import Heading
@@ -109,7 +109,7 @@ class PlanPanel:
 
     def _course_tab(self, gui: Any) -> None:
         do = self._do
-        self._count = gui.add_markdown("")
+        self._count = gui.add_html("")
         self._index = gui.add_number(
             "Waypoint", 0, min=0, max=1, step=1, hint="The chosen one; or click a ball."
         )
@@ -276,10 +276,7 @@ class PlanPanel:
         """Set every widget to what is edited."""
         self.show_chosen(edited, chosen)
         count, length = len(edited.waypoints), float(edited.problem.leg_lengths.sum())
-        self._count.content = (
-            f"**{edited.name}**: {count} waypoints, {length:.1f} m. Drag a ball: it stays at its "
-            "height; with Shift, up and down. The arrows move the chosen one along an axis."
-        )
+        self._count.content = course_line(edited.name, count, length)
         vehicle = edited.vehicle
         name = NO_VEHICLE if vehicle is None else vehicle.name
         if name not in self._vehicle.options:

@@ -16,7 +16,7 @@ from peakflight.page.drawing import Drawing
 from peakflight.page.edited import Edited
 from peakflight.page.flight_panel import FlightPanel
 from peakflight.page.handles import Handles, Phase
-from peakflight.page.header import Summary
+from peakflight.page.header import EARLIER, Summary, badge
 from peakflight.page.history import History
 from peakflight.page.placing import Place, place_after, place_in_sight
 from peakflight.page.plan_panel import PlanPanel
@@ -42,9 +42,11 @@ class Page:
         self._history = History(edited)
         self._chosen = 0
         self._drawing: Drawing | None = None
+        self._answered: Edited | None = None
+        self._is_grey = False
         self._shown: Shown | None = None
         self._accepted: Drawing | None = None
-        self._error = self._notice = ""
+        self._error = self._refused = self._notice = ""
         self._views = {"legs": False, "accepted": True, "rings": True}
         self._adds_by_click = False
         self.thread = PageThread(self._failed)
@@ -82,13 +84,15 @@ class Page:
     def summary(self) -> Summary:
         """What the header says."""
         shown, accepted = self._shown, self._accepted
-        busy = self.planner.busy
-        follows = self._history.gesture != "" and not self.planner.idle
+        busy, pending = self.planner.busy, not self.planner.idle
         return Summary(
             plan=self.drawn,
-            fresh=shown is not None and (follows or shown.edited is self.edited),
+            fresh=self._drawing is not None and self._answered is self.edited,
+            follows=self._history.gesture != "" and pending,
+            pending=pending,
             whole=shown is not None and shown.whole,
             error=self._error,
+            refused=self._refused,
             busy=busy if busy is not None and busy > BUSY_AFTER else None,
             notice=self._notice,
             guess=None if shown is None else shown.guess,
@@ -223,8 +227,7 @@ class Page:
 
     def save(self, what: str, client: Any) -> None:
         """Send a file to whoever asked for it."""
-        plan, edited, fresh = self.drawn, self.edited, self.summary.fresh
-        Saving(self.say, what, plan if fresh else None, edited, client).start()
+        self._post(lambda: self._save(what, client))
 
     def say(self, text: str, *, good: bool, client: Any = None) -> None:
         """Show what became of a file, to everyone, and to whoever asked as a notification."""
@@ -240,8 +243,9 @@ class Page:
     def _begin(self) -> None:
         """Show a course that was not there before, to everyone, and have it planned."""
         edited = self.edited
-        self._chosen, self._error = min(1, len(edited.waypoints) - 1), ""
-        self._drawing = self._shown = self._accepted = None
+        self._chosen = min(1, len(edited.waypoints) - 1)
+        self._error = self._refused = ""
+        self._drawing = self._answered = self._shown = self._accepted = None
         self._scene.clear()
         self._playback.clear()
         self._lay_ground()
@@ -274,7 +278,7 @@ class Page:
         try:
             edited = change(self.edited)
         except PeakflightError as error:
-            self._error = str(error)
+            self._refused = str(error)
             self._handles.show(self.edited.waypoints, self._chosen)
             self._panel.show_edited(self.edited, self._chosen)
             self._show_header()
@@ -291,7 +295,8 @@ class Page:
             self._history = history
             return
         before, edited = self.edited, history.present
-        self._history, self._error = history, ""
+        self._history = history
+        self._error = self._refused = ""
         if edited.is_other_than(before):
             self._begin()
             return
@@ -303,6 +308,7 @@ class Page:
             self._panel.show_edited(edited, self._chosen)
         else:
             self._panel.show_chosen(edited, self._chosen)
+        self._show_header()
 
     def _end_move(self, index: int, position: np.ndarray) -> None:
         """A waypoint is let go."""
@@ -366,10 +372,17 @@ class Page:
         except PeakflightError as error:
             self.say(str(error), good=False, client=client)
             return
+        except Exception as error:  # whoever uploads must see it, too
+            self.say(f"{name}: {_bug(error)}", good=False, client=client)
+            raise
         self._history = self._history.do(edited)
         self._begin()
         count = len(edited.waypoints)
         self.say("; ".join((f"{name}: {count} waypoints", *notes)), good=True)
+
+    def _save(self, what: str, client: Any) -> None:
+        plan = self.drawn if self.summary.fresh else None
+        Saving(self.say, what, plan, self.edited, client).start()
 
     # What the planner and the clock bring.
 
@@ -394,12 +407,11 @@ class Page:
         self._shown = Shown(**{**shown.__dict__, "guess": guess})
         if shown.plan is None or shown.states is None:
             self._error = shown.error
-            if self._drawing is not None:
-                self._scene.draw_path(self._drawing, fresh=False)
             self._show_header()
             return
         self._error = ""
         self._drawing = drawing = Drawing(shown.plan, shown.states)
+        self._answered, self._is_grey = shown.edited, False
         self._scene.draw_path(drawing)
         self._show_header()
         self._server.flush()
@@ -410,7 +422,13 @@ class Page:
             self._scene.label_legs(drawing)
 
     def _show_header(self) -> None:
-        self._panel.show_header(self.summary)
+        """Say what is proven; the path is grey where it does not answer what is edited."""
+        summary = self.summary
+        self._panel.show_header(summary)
+        is_grey = badge(summary)[0] == EARLIER
+        if self._drawing is not None and is_grey is not self._is_grey:
+            self._is_grey = is_grey
+            self._scene.draw_path(self._drawing, fresh=not is_grey)
 
     def _tick(self) -> None:
         """Wake the page while there is something that moves."""
@@ -424,4 +442,9 @@ class Page:
                 self._post(self._show_header, key="header")
 
     def _failed(self, error: Exception) -> None:
-        self._error = f"unexpected {type(error).__name__}: {error}; this is a bug in the page"
+        self._error = _bug(error)
+        self._show_header()
+
+
+def _bug(error: Exception) -> str:
+    return f"unexpected {type(error).__name__}: {error}; this is a bug in the page"

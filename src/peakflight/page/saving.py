@@ -10,6 +10,7 @@ from peakflight.page.edited import Edited
 from peakflight.result import Plan
 
 _log = logging.getLogger("peakflight")
+_one_at_a_time = threading.Lock()
 
 
 class Saying(Protocol):
@@ -35,7 +36,8 @@ class Saving:
     def _run(self) -> None:
         """Make it and send it, or say why not."""
         try:
-            name, content, said = self._made()
+            with _one_at_a_time:
+                name, content, said = self._made()
         except PeakflightError as error:
             self._say(str(error), good=False, client=self._client)
             return
