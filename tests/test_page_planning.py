@@ -13,7 +13,7 @@ from peakflight.page import files
 from peakflight.page.asking import Planner, Shown
 from peakflight.page.drawing import Drawing
 from peakflight.page.edited import Edited
-from peakflight.page.header import Summary, badge, header, legs_table
+from peakflight.page.header import Summary, badge, course_line, header, legs_table, message
 from peakflight.page.solver import Request, answer
 from peakflight.page.states import states
 from peakflight.page.thread import PageThread
@@ -155,6 +155,8 @@ def test_only_a_proven_plan_of_the_course_as_it_is_is_called_certified() -> None
 def test_text_of_others_is_not_markup() -> None:
     hostile = "<img src=x onerror=alert(1)>"
     assert hostile not in header(summary(None, error=hostile))
+    assert hostile not in message(hostile, good=False)
+    assert hostile not in course_line(hostile, 3, 1.0)
 
 
 def test_legs_say_what_holds_them_back() -> None:
@@ -229,6 +231,26 @@ def test_broken_uploads_are_refused_by_name(name: str, content: bytes, words: st
         files.load_upload(name, content, edited())
     assert "peakflight-page-" not in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "called"),
+    [
+        ("a\0b.csv", "a\0b"),
+        ("n" * 300 + ".csv", "n" * 300),
+        ("C:\\x\\my.csv", "my"),
+        ("", "upload"),
+    ],
+)
+def test_uploads_may_have_any_name(name: str, called: str) -> None:
+    found, _ = files.load_upload(name, b"x,y,z\n0,0,1\n1,0,1\n", edited())
+    assert found.name == called
+
+
+def test_a_plan_that_is_uploaded_is_called_as_its_file() -> None:
+    content = files.plan_json(pf.plan(edited().problem, pieces=1))
+    for name in ("plan", "race"):
+        assert files.load_upload(f"{name}.json", content, edited())[0].name == name
 
 
 @pytest.mark.parametrize("to", ["crazyswarm", "samples", "px4"])

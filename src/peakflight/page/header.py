@@ -50,7 +50,7 @@ def badge(summary: Summary) -> tuple[str, str, str]:
     if not plan.report.feasible:
         why = plan.message or "; ".join(plan.report.problems)
         return "not certified", colours.BAD, why
-    if summary.fresh:
+    if summary.fresh and not summary.error:
         return "certified", colours.GOOD, "every limit is proven, not sampled"
     if summary.follows:
         return (
