@@ -15,6 +15,8 @@ from peakflight.page.edited import Edited
 from peakflight.page.header import badge, header
 from peakflight.page.planner_page import Page
 from peakflight.page.server import PageServer
+from peakflight.page.solver import Request
+from peakflight.page.solver import answer as answer_of
 
 COURSE = pf.Course(np.array([[0.0, 0, 1], [2, 0, 1], [2, 2, 1.5]]))
 PATIENCE = 300.0
@@ -136,3 +138,16 @@ def test_what_cannot_be_loaded_is_said_whatever_it_is(
     until(lambda: "x.csv: unexpected OverflowError: too far" in said(page))
     assert page.thread.failures == failures + 1
     assert "this is a bug" in header(page.summary)
+
+
+def test_a_plan_without_a_guess_to_compare_with_is_a_plan(page: Page) -> None:
+    """No spline of the guess has this motion at the start."""
+    problem = pf.Problem(
+        COURSE.waypoints,
+        limits=page.edited.problem.limits,
+        start={"velocity": [1.0, 0, 0], "snap": [3.0, 0, 0]},
+    )
+    found = answer_of(Request(number=1, problem=problem, method="joint", options={}, guess=True))
+    assert found.plan is not None, found.error
+    assert found.plan.feasible
+    assert found.guess is None

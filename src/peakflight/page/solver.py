@@ -77,14 +77,12 @@ def main() -> None:
 def answer(request: Request) -> Answer:
     """Plan, and whatever goes wrong, say so."""
     from peakflight.planner import plan
+    from peakflight.reporting.findings import initial_guess
 
     began = time.perf_counter()
     try:
         found = plan(request.problem, method=request.method, **request.options)
-        guess = None
-        if request.guess:
-            first = plan(request.problem, method="proportional")
-            guess = first.duration if first.feasible else None
+        first = initial_guess(found) if request.guess else None
         flown = states(found)
     except PeakflightError as error:
         return Answer(number=request.number, error=str(error))
@@ -92,6 +90,7 @@ def answer(request: Request) -> Answer:
         text = f"unexpected {type(error).__name__}: {error}; this is a bug"
         return Answer(number=request.number, error=text)
     seconds = time.perf_counter() - began
+    guess = None if first is None else first.duration
     return Answer(number=request.number, plan=found, states=flown, guess=guess, seconds=seconds)
 
 

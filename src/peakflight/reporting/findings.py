@@ -65,7 +65,7 @@ def find(plan: Plan, claims: Mapping[str, Any] | None = None) -> Findings:
     return Findings(
         plan=plan,
         false_claims=wrong,
-        guess=_guess(plan),
+        guess=initial_guess(plan),
         legs=leg_summaries(plan),
         limits=limit_summaries(plan),
         leg_lengths=_leg_lengths(plan),
@@ -79,8 +79,11 @@ def is_rest(state: Any) -> bool:
     return state is None or not np.any(np.asarray(state) != 0.0)
 
 
-def _guess(plan: Plan) -> Plan | None:
-    """The guess, with the spline that is usual for what the problem minimizes."""
+def initial_guess(plan: Plan) -> Plan | None:
+    """The paper's guess, with the spline that is usual for what the problem minimizes.
+
+    None where the plan is that guess, or where it cannot be made.
+    """
     if plan.method == GUESS:
         return None
     usual: dict[str, Any] = {"degree": None, "continuity": None}
