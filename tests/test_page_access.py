@@ -201,7 +201,8 @@ def test_the_port_in_use_ends_the_command() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signals")
-def test_ctrl_c_ends_it_and_its_processes() -> None:
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_end_it_and_its_processes(name: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "peakflight", "page", "--port", "0", "--no-browser", "--json"],
         stdout=subprocess.PIPE,
@@ -212,8 +213,8 @@ def test_ctrl_c_ends_it_and_its_processes() -> None:
     assert process.stdout is not None
     url = json.loads(process.stdout.readline())["url"]
     assert url.startswith("http://127.0.0.1:")
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    process.send_signal(getattr(signal, name))
+    out, err = process.communicate(timeout=60)  # until its processes have ended as well
     assert process.returncode == 130
     assert out == ""
     assert err.strip().splitlines()[-1] == "peakflight: interrupted"
