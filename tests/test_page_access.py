@@ -83,8 +83,17 @@ def test_another_sites_page_may_not(local: PageServer, origin: str) -> None:
     assert socket_status(local, Origin=origin) == 403
 
 
-def test_another_name_for_this_machine_may_not(local: PageServer) -> None:
-    assert get(local, Host="evil.example").status == 403
+@pytest.mark.parametrize(
+    "name", ["evil.example", "127.evil.example", "127.0.0.1.evil.example", "[::1", ""]
+)
+def test_another_name_for_this_machine_may_not(local: PageServer, name: str) -> None:
+    assert get(local, Host=name).status == 403
+    assert get(local, Host=f"{name}:{local.viser.get_port()}").status == 403
+
+
+@pytest.mark.parametrize("name", ["localhost", "LOCALHOST", "127.0.0.1", "[::1]"])
+def test_this_machine_may_be_named_in_each_way(local: PageServer, name: str) -> None:
+    assert get(local, Host=f"{name}:{local.viser.get_port()}").status == 200
 
 
 def test_beyond_this_machine_the_token_is_needed(wide: PageServer) -> None:
@@ -95,7 +104,10 @@ def test_beyond_this_machine_the_token_is_needed(wide: PageServer) -> None:
     assert get(wide).status == 403
     assert get(wide, "/?token=wrong").status == 403
     assert socket_status(wide) == 403
-    assert socket_status(wide, Cookie="peakflight_token=wrong") == 403
+    name = f"peakflight_token_{wide.viser.get_port()}"
+    assert socket_status(wide, Cookie=f"{name}=wrong") == 403
+    assert socket_status(wide, Cookie=f"{name}=\xff") == 403
+    assert socket_status(wide, Cookie=f"{name}") == 403
     entered = get(wide, urlsplit(wide.url).path + "?" + urlsplit(wide.url).query)
     assert entered.status == 303
     assert entered.headers["Location"] == "/"
@@ -106,6 +118,35 @@ def test_beyond_this_machine_the_token_is_needed(wide: PageServer) -> None:
     assert socket_status(wide, Cookie=cookie.split(";")[0]) == 101
     assert socket_status(wide, Cookie=cookie.split(";")[0], Origin="http://evil.example") == 403
     assert token not in repr(wide.access)
+
+
+def entered(server: PageServer) -> str:
+    """The cookie that the address with the token gives, as a browser sends it back."""
+    response = get(server, "/?" + urlsplit(server.url).query)
+    assert response.status == 303
+    return response.headers["Set-Cookie"].split(";")[0]
+
+
+@pytest.mark.parametrize("foreign", ['a={"x":1}', "a=[1, 2]", "a", '"', "a b=c", "=", "\xff=\xff"])
+def test_cookies_of_others_are_no_matter(wide: PageServer, foreign: str) -> None:
+    cookie = entered(wide)
+    for both in (f"{foreign}; {cookie}", f"{cookie}; {foreign}"):
+        assert get(wide, Cookie=both).status == 200
+        assert socket_status(wide, Cookie=both) == 101
+    assert get(wide, Cookie=foreign).status == 403
+
+
+def test_two_servers_on_a_host_keep_their_cookies_apart(wide: PageServer) -> None:
+    other = PageServer(Edited.of_course(COURSE), host="0.0.0.0", port=0)
+    try:
+        cookies = [entered(server) for server in (wide, other)]
+        kept = dict(cookie.split("=", 1) for cookie in cookies)  # as the browser does, by name
+        sent = "; ".join(f"{name}={value}" for name, value in kept.items())
+        assert get(wide, Cookie=sent).status == 200
+        assert get(other, Cookie=sent).status == 200
+        assert get(other, Cookie=cookies[0]).status == 403
+    finally:
+        other.close()
 
 
 def test_what_was_stopped_is_not_called_certified(
@@ -160,7 +201,8 @@ def test_the_port_in_use_ends_the_command() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no signals")
-def test_ctrl_c_ends_it_and_its_processes() -> None:
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_end_it_and_its_processes(name: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "peakflight", "page", "--port", "0", "--no-browser", "--json"],
         stdout=subprocess.PIPE,
@@ -171,8 +213,8 @@ def test_ctrl_c_ends_it_and_its_processes() -> None:
     assert process.stdout is not None
     url = json.loads(process.stdout.readline())["url"]
     assert url.startswith("http://127.0.0.1:")
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    process.send_signal(getattr(signal, name))
+    out, err = process.communicate(timeout=60)  # until its processes have ended as well
     assert process.returncode == 130
     assert out == ""
     assert err.strip().splitlines()[-1] == "peakflight: interrupted"

@@ -1,5 +1,9 @@
 """The page without a browser: planning, files, who may look, and what is called certified."""
 
+import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -103,17 +107,42 @@ def test_something_newer_does_not_wait_for_a_long_solve(
     planner: Planner, shown: list[Shown]
 ) -> None:
     vehicle = pf.find_vehicle("crazyflie-2.1-upgrade")
+    planner.ask(edited().fly(vehicle))
+    until(lambda: planner.idle and planner._spare_ready)
     planner.ask(edited(200).fly(vehicle).plan_by(pieces=4))
-    time.sleep(0.5)
+    until(lambda: planner._job is not None and planner._job.whole)  # half a minute of work
+    first, second = planner.pids
+    shown.clear()
     planner.ask(edited())
-    until(lambda: shown and shown[-1].whole and len(shown[-1].edited.waypoints) == 6)
-    assert not any(one.whole for one in shown[:-1])  # the long one was given up
+    until(lambda: shown and shown[-1].whole)
+    assert planner.pids[0] == second != first  # the one that stood ready has taken over
+    assert {len(one.edited.waypoints) for one in shown} == {6}  # the long one was given up
+
+
+def test_what_was_answered_has_been_shown_once_the_planner_is_idle() -> None:
+    entered, gate, shown = threading.Event(), threading.Event(), []
+
+    def show(one: Shown) -> None:
+        entered.set()
+        gate.wait()
+        shown.append(one)
+
+    planner = Planner(show)
+    try:
+        planner.ask(edited())
+        assert entered.wait(300.0)
+        planner.cancel()  # what else there is to do
+        assert not planner.idle
+        assert planner.busy is None  # the solve is over
+        gate.set()
+        until(lambda: planner.idle)
+        assert len(shown) == 1
+    finally:
+        gate.set()
+        planner.close()
 
 
 def test_a_process_that_dies_is_replaced(planner: Planner, shown: list[Shown]) -> None:
-    import os
-    import signal
-
     planner.ask(edited())
     until(lambda: shown and shown[-1].whole and len(planner.pids) == 2)
     for pid in planner.pids:
@@ -122,6 +151,113 @@ def test_a_process_that_dies_is_replaced(planner: Planner, shown: list[Shown]) -
     shown.clear()
     planner.ask(edited(7))
     until(lambda: any(one.plan is not None and one.whole for one in shown))
+
+
+def test_a_process_that_dies_at_work_is_said_and_replaced(
+    planner: Planner, shown: list[Shown]
+) -> None:
+    for _ in range(2):
+        shown.clear()
+        planner.ask(edited().plan_by(method="proportional"))
+        until(lambda: planner.busy is not None or shown)
+        os.kill(planner.pids[0], signal.SIGTERM)
+        until(lambda: planner.idle)
+    shown.clear()
+    planner.ask(edited(7))
+    until(lambda: any(one.whole for one in shown))
+    assert all(one.plan is not None for one in shown)  # no word of what had died before
+
+
+def refuse(*arguments: object, **options: object) -> None:
+    raise OSError(12, "Cannot allocate memory")
+
+
+def test_without_a_process_the_page_says_so_and_goes_on(
+    planner: Planner, shown: list[Shown], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner.ask(edited())
+    until(lambda: planner.idle)
+    with monkeypatch.context() as patched:
+        patched.setattr("subprocess.Popen", refuse)
+        for pid in planner.pids:
+            os.kill(pid, signal.SIGTERM)
+        until(lambda: not planner._process.alive)
+        for count in (7, 8):
+            shown.clear()
+            planner.ask(edited(count))
+            until(lambda: planner.idle)
+            assert "Cannot allocate memory" in shown[-1].error
+            assert len(shown[-1].edited.waypoints) == count
+    shown.clear()
+    planner.ask(edited(9))
+    until(lambda: planner.idle)
+    assert shown[-1].whole
+    assert shown[-1].plan is not None
+
+
+def test_an_answer_that_cannot_be_read_is_said(
+    planner: Planner, shown: list[Shown], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unreadable(stream: object) -> None:
+        raise AttributeError("no such class")
+
+    planner.ask(edited())
+    until(lambda: planner.idle)
+    with monkeypatch.context() as patched:
+        shown.clear()
+        patched.setattr("peakflight.page.process.pickle.load", unreadable)
+        for count in (7, 8):  # the first of them may be read by who waited already
+            planner.ask(edited(count))
+            until(lambda: planner.idle)
+        assert any("no such class" in one.error for one in shown)
+    shown.clear()
+    planner.ask(edited(9))
+    until(lambda: planner.idle)
+    assert shown[-1].plan is not None
+
+
+def test_a_plan_that_cannot_be_shown_does_not_end_the_planner() -> None:
+    shown: list[Shown] = []
+
+    def show(one: Shown) -> None:
+        shown.append(one)
+        raise RuntimeError("no screen")
+
+    planner = Planner(show)
+    try:
+        for count in (6, 7):
+            planner.ask(edited(count))
+            until(lambda: planner.idle)
+            assert shown[-1].whole
+            assert len(shown[-1].edited.waypoints) == count
+    finally:
+        planner.close()
+
+
+WORKING = """
+import sys, threading
+sys.path.insert(0, {tests!r})
+from test_page_planning import *
+
+slow = edited(200).fly(pf.find_vehicle("crazyflie-2.1-upgrade")).plan_by(pieces=8)
+planner = Planner(lambda shown: None)
+planner.ask(slow)
+until(lambda: planner._job is not None and planner._job.whole)
+print("works", flush=True)
+threading.Event().wait()
+"""
+
+
+def test_however_the_server_ends_so_do_its_processes() -> None:
+    command = [sys.executable, "-c", WORKING.format(tests=str(Path(__file__).parent))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as server:
+        assert server.stdout is not None
+        try:
+            assert server.stdout.readline() == b"works\n"
+            time.sleep(0.5)  # the solve is at work
+        finally:
+            server.kill()
+        server.communicate(timeout=15)  # until nobody holds its standard error any more
 
 
 def test_errors_are_words(shown: list[Shown]) -> None:
@@ -282,3 +418,16 @@ def test_the_thread_does_the_newest_under_a_key_and_survives_a_bug() -> None:
     assert done == [99, "last"]
     assert len(failures) == thread.failures == 1
     thread.close()
+
+
+def test_the_thread_does_what_replaces_after_what_came_before_it() -> None:
+    thread = PageThread(lambda error: None)
+    gate, done = threading.Event(), []
+    thread.post(gate.wait)  # type: ignore[arg-type]
+    thread.post(lambda: done.append("slide"), key="slide")
+    thread.post(lambda: done.append("undo"))
+    thread.post(lambda: done.append("newest slide"), key="slide")
+    gate.set()
+    assert thread.settle()
+    thread.close()
+    assert done == ["undo", "newest slide"]

@@ -1,6 +1,9 @@
 """`peakflight page`: the planner page."""
 
+import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -19,6 +22,10 @@ FIRST_COURSE = (
     (-1.0, 2.0, 1.2),
 )
 """m, what the page begins with where no course is named."""
+
+ENDING = ("SIGTERM", "SIGHUP")
+"""Signals that end the page as Ctrl-C does, where the system has them: from whoever stops a
+service, and from a terminal that is closed."""
 
 
 @click.command(short_help="Edit a course in the browser, and see the fastest flight change.")
@@ -77,15 +84,35 @@ def page(
         edited = edited.limit(given)
     from peakflight.page.server import PageServer
 
-    server = PageServer(edited, host=host, port=port)
-    try:
-        _announce(server.url, server.is_local, notes, as_json)
-        if browse:
-            click.launch(server.url)
-        threading.Event().wait()
-    finally:
-        server.close()
+    with _ended_by_signals():
+        server = PageServer(edited, host=host, port=port)
+        try:
+            _announce(server.url, server.is_local, notes, as_json)
+            if browse:
+                click.launch(server.url)
+            threading.Event().wait()
+        finally:
+            server.close()
     return 0
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Within it, signals that would end this process at once end it as Ctrl-C does.
+
+    One that is ignored, as by `nohup`, stays so.
+    """
+    numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
+    before = {
+        number: signal.signal(number, signal.default_int_handler)
+        for number in numbers
+        if signal.getsignal(number) is signal.SIG_DFL
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _announce(url: str, local: bool, notes: tuple[str, ...], as_json: bool) -> None:

@@ -5,12 +5,12 @@ this server as its host, and as the site that it comes from, if it says one. Whe
 bound wider, a token is needed as well, by the address that is printed and then by a cookie.
 """
 
+import ipaddress
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -18,14 +18,25 @@ import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 COOKIE = "peakflight_token"
+"""How the name of the cookie begins; the port follows, since a browser keeps the cookies of all
+servers of a host together."""
+HTTP_PORT = 80
+"""Port of an address that names none."""
 TOKEN_BYTES = 24
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach a server that is bound to a host."""
-    return host in LOOPBACK or host.startswith("127.")
+    """Whether a host is this machine as only this machine can name it.
+
+    Of names that is `localhost` alone: any other can be made to lead here, whatever it begins with.
+    """
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 @dataclass(frozen=True)
@@ -57,11 +68,12 @@ class Access:
         if given:
             if not _same(given, self.token):
                 return _answer(HTTPStatus.FORBIDDEN, "the token is wrong")
-            cookie = f"{COOKIE}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+            name = _cookie_name(request.headers)
+            cookie = f"{name}={self.token}; Path=/; HttpOnly; SameSite=Strict"
             return _answer(
                 HTTPStatus.SEE_OTHER, "", {"Location": path.path or "/", "Set-Cookie": cookie}
             )
-        if not _same(_cookie(request.headers), self.token):
+        if not any(_same(value, self.token) for value in _cookies(request.headers)):
             return _answer(HTTPStatus.FORBIDDEN, "open the address that peakflight page printed")
         return None
 
@@ -91,21 +103,36 @@ def guarded(access: Access) -> Iterator[list[Any]]:
 
 
 def _named(host: str) -> str:
-    """The host of a `Host` header, without its port."""
-    return urlsplit(f"//{host}").hostname or ""
-
-
-def _cookie(headers: Headers) -> str:
+    """The host of a `Host` header, without its port; nothing if there is none to be read."""
     try:
-        cookies = SimpleCookie("; ".join(headers.get_all("Cookie")))
-    except CookieError:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
         return ""
-    return cookies[COOKIE].value if COOKIE in cookies else ""
+
+
+def _cookie_name(headers: Headers) -> str:
+    """What the cookie is called at the port by which the browser knows this server."""
+    try:
+        port = urlsplit(f"//{headers.get('Host', '')}").port
+    except ValueError:
+        port = None
+    return f"{COOKIE}_{port or HTTP_PORT}"
+
+
+def _cookies(headers: Headers) -> list[str]:
+    """Values of the cookies by our name; whatever others of this host there are, and however made.
+
+    Those of `http.cookies` are none at all once one of them is against its rules.
+    """
+    name = _cookie_name(headers)
+    every = ";".join(headers.get_all("Cookie")).split(";")
+    pairs = [one.strip().partition("=") for one in every]
+    return [value for key, _, value in pairs if key == name]
 
 
 def _same(given: str, token: str) -> bool:
     """Whether two are alike, in a time that does not tell how much of them is."""
-    return secrets.compare_digest(given.encode(), token.encode())
+    return secrets.compare_digest(given.encode(errors="surrogatepass"), token.encode())
 
 
 def _answer(status: HTTPStatus, text: str, headers: dict[str, str] | None = None) -> Response:

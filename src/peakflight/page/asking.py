@@ -5,6 +5,7 @@ quick, else with one piece a leg. When it rests, it is planned as `peakflight pl
 beginning, so that the same course gives the same plan however one got there.
 """
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -27,6 +28,8 @@ PATIENCE, GRACE = 1.0, 0.2
 stopped, and a process with it, once another one is ready."""
 WARM_LEGS = 2
 """Legs of the course by which a new process is warmed up."""
+
+_log = logging.getLogger("peakflight")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,15 +82,15 @@ class Planner:
         self._wish: _Wish | None = None
         self._job: _Job | None = None
         self._answer: Answer | None = None
-        self._died = self._stop = self._closed = False
+        self._stop = self._closed = False
         self._serial = self._number = 0
         self._last: Plan | None = None
         self._single: Plan | None = None
         self._keeps = True
         self._drafted_at = 0.0
-        self._spare_ready = False
+        self._spare_ready = self._spare_asked = False
         self._process = SolverProcess(self._hear)
-        self._spare: SolverProcess | None = None
+        self._spare: SolverProcess | None = SolverProcess(self._hear)
         self._thread = threading.Thread(target=self._run, name="peakflight planner", daemon=True)
         self._thread.start()
 
@@ -118,11 +121,13 @@ class Planner:
     def busy(self) -> float | None:
         """How long the solve at hand has been going on, s; None if there is none."""
         with self._changed:
-            return None if self._job is None else time.perf_counter() - self._job.began
+            if self._job is None or self._answer is not None:
+                return None
+            return time.perf_counter() - self._job.began
 
     @property
     def idle(self) -> bool:
-        """Whether there is nothing to do."""
+        """Whether there is nothing to do, and all that was done has been shown."""
         with self._changed:
             return self._job is None and self._wish is None
 
@@ -145,29 +150,50 @@ class Planner:
     def _run(self) -> None:
         """Take up what is wished for, one after the other."""
         while (job := self._begin()) is not None:
-            answer = self._finish(job)
-            if answer is None:
-                continue
-            if self._spare is None:
-                self._spare = self._warmed(job.wish.edited)
-            self._learn(job, answer)
-            if not job.whole:
-                self._drafted_at = time.perf_counter()
-            self._shown(
-                Shown(
-                    edited=job.wish.edited,
-                    plan=answer.plan,
-                    states=answer.states,
-                    error=answer.error,
-                    guess=answer.guess,
-                    seconds=answer.seconds,
-                    whole=job.whole,
-                    asked_at=job.wish.at,
-                )
-            )
+            try:
+                self._do(job)
+            except Exception as error:  # whatever it is, what comes next is planned
+                _log.exception("the planner failed at something")
+                text = f"unexpected {type(error).__name__}: {error}; the next change begins anew"
+                self._show(job, Answer(number=job.number, error=text))
+            with self._changed:
+                self._job = None
+
+    def _do(self, job: _Job) -> None:
+        """Plan one thing and show it, unless it is stopped."""
+        if not self._process.alive:
+            self._replace(job.wish.edited)
+        self._process.send(self._request(job))
+        answer = self._finish(job)
+        if answer is None:
+            return
+        self._learn(job, answer)
+        if not job.whole:
+            self._drafted_at = time.perf_counter()
+        self._show(job, answer)
+        if not self._spare_asked:
+            self._prepare(job.wish.edited)
+
+    def _show(self, job: _Job, answer: Answer) -> None:
+        with self._changed:
+            self._answer = answer
+        shown = Shown(
+            edited=job.wish.edited,
+            plan=answer.plan,
+            states=answer.states,
+            error=answer.error,
+            guess=answer.guess,
+            seconds=answer.seconds,
+            whole=job.whole,
+            asked_at=job.wish.at,
+        )
+        try:
+            self._shown(shown)
+        except Exception:
+            _log.exception("a plan could not be shown")
 
     def _begin(self) -> _Job | None:
-        """Wait for something to do, and send it; None at the end."""
+        """Wait for something to do, and take it up; None at the end."""
         with self._changed:
             while not self._closed:
                 wish = self._wish
@@ -187,9 +213,6 @@ class Planner:
             job = _Job(wish, whole, self._number, time.perf_counter())
             self._job, self._answer = job, None
             self._wish = None if whole else replace(wish, drafted=True)
-        if not self._process.alive:
-            self._replace(job.wish.edited)
-        self._process.send(self._request(job))
         return job
 
     def _is_whole(self, wish: _Wish) -> bool:
@@ -239,46 +262,54 @@ class Planner:
             self._single = plan
 
     def _finish(self, job: _Job) -> Answer | None:
-        """Wait for the answer; None if the solve was stopped, or its process died."""
+        """Wait for the answer; None if the solve was stopped."""
+        process = self._process
         with self._changed:
-            while self._answer is None and not (self._closed or self._died or self._stop):
+            while self._answer is None and not (self._closed or process.ended or self._stop):
                 newer = self._wish is not None and self._wish.serial != job.wish.serial
                 left = job.began + (GRACE if job.whole else PATIENCE) - time.perf_counter()
                 if newer and left <= 0.0 and self._spare_ready:
                     break
                 self._changed.wait(left if newer and left > 0.0 else None)
-            answer, died = self._answer, self._died
-            self._job = None
+            answer, ended = self._answer, process.ended
             if answer is not None or self._closed:
                 return answer
-            self._died = False
         self._replace(job.wish.edited)
-        if died:
-            text = "the process that plans has died; the next change begins anew"
+        if ended:
+            text = f"the process that plans {ended}; the next change begins anew"
             return Answer(number=job.number, error=text)
         return None
 
     def _replace(self, edited: Edited) -> None:
-        """Go on with the process that stands ready."""
+        """Go on with the process that stands ready, and prepare another one."""
         old, spare = self._process, self._spare
+        self._spare, self._spare_ready, self._spare_asked = None, False, False
         if spare is not None and not spare.alive:
             spare.kill()
             spare = None
-        self._process = spare or SolverProcess(self._hear)
-        self._spare = self._warmed(edited)
-        old.kill()
+        try:
+            self._process = spare or SolverProcess(self._hear)
+        finally:
+            old.kill()
+        self._prepare(edited)
 
-    def _warmed(self, edited: Edited) -> SolverProcess:
-        """A process that has planned something alike, and so has loaded what that takes."""
-        process = SolverProcess(self._hear)
-        self._spare_ready = False
+    def _prepare(self, edited: Edited) -> None:
+        """Have another process plan something alike, so that it has loaded what that takes.
+
+        Without one, what is newer waits for what is at hand.
+        """
+        try:
+            spare = self._spare = self._spare or SolverProcess(self._hear)
+        except OSError:
+            _log.warning("no other process can be kept ready", exc_info=True)
+            return
         try:
             few = edited.problem.waypoints[: WARM_LEGS + 1]
             problem = replace(edited.problem, waypoints=few, derivatives={}, yaw=None)
         except ValueError:
-            return process
-        process.send(Request(number=0, problem=problem, method=edited.method, guess=True))
-        return process
+            return
+        self._spare_asked = True
+        spare.send(Request(number=0, problem=problem, method=edited.method, guess=True))
 
     def _hear(self, process: SolverProcess, said: Answer | Notice | None) -> None:
         """Called from the threads that listen."""
@@ -291,8 +322,6 @@ class Planner:
                 self._changed.notify_all()
             if process is not self._process:
                 return
-            if said is None:
-                self._died = self._job is not None
-            elif self._job is not None and said.number == self._job.number:
+            if self._job and said is not None and said.number == self._job.number:
                 self._answer = said
             self._changed.notify_all()

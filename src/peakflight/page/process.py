@@ -1,6 +1,7 @@
 """A process that plans, as seen from the server."""
 
 import contextlib
+import logging
 import pickle
 import subprocess
 import sys
@@ -11,7 +12,9 @@ from typing import TypeAlias
 from peakflight.page.solver import Answer, Notice, Request
 
 Heard: TypeAlias = Callable[["SolverProcess", Answer | Notice | None], None]
-"""Told what a process says; None when it has ended."""
+"""Told what a process says; None when there is nothing more to come from it."""
+
+_log = logging.getLogger("peakflight")
 
 
 class SolverProcess:
@@ -19,6 +22,7 @@ class SolverProcess:
 
     def __init__(self, heard: Heard) -> None:
         self._heard = heard
+        self._ended = ""
         self._process = subprocess.Popen(
             [sys.executable, "-m", "peakflight.page.solver"],
             stdin=subprocess.PIPE,
@@ -32,16 +36,21 @@ class SolverProcess:
         return self._process.pid
 
     @property
+    def ended(self) -> str:
+        """Why nothing more comes from it, once all that it said has been heard; else empty."""
+        return self._ended
+
+    @property
     def alive(self) -> bool:
-        """Whether it still runs."""
-        return self._process.poll() is None
+        """Whether it still runs, and can be heard."""
+        return not self._ended and self._process.poll() is None
 
     def send(self, request: Request) -> None:
         """Ask for a plan; the answer comes to `heard`. Nothing is sent to one that has ended."""
         stream = self._process.stdin
         assert stream is not None
         with contextlib.suppress(BrokenPipeError, ValueError):
-            pickle.dump(request, stream, protocol=pickle.HIGHEST_PROTOCOL)
+            stream.write(pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL))
             stream.flush()
 
     def kill(self) -> None:
@@ -60,4 +69,8 @@ class SolverProcess:
             while True:
                 self._heard(self, pickle.load(stream))
         except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-            self._heard(self, None)
+            self._ended = "has died"
+        except Exception as error:  # whoever waits for an answer must learn that none comes
+            _log.exception("an answer cannot be read")
+            self._ended = f"cannot be understood ({type(error).__name__}: {error})"
+        self._heard(self, None)

@@ -8,9 +8,12 @@ and output; whatever prints goes to the standard error.
 import logging
 import os
 import pickle
+import queue
 import signal
 import sys
+import threading
 import time
+import traceback
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
@@ -57,21 +60,34 @@ class Notice:
 
 
 def main() -> None:
-    """Answer requests until the input ends."""
+    """Answer requests until the input ends, which ends a solve at hand as well."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     logging.getLogger("peakflight").addHandler(_Noticing(replies))
-    requests = sys.stdin.buffer
+    requests: queue.SimpleQueue[Request] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(requests,), name="requests", daemon=True).start()
     while True:
         try:
-            request = pickle.load(requests)
-        except EOFError:
-            return
-        try:
-            _send(replies, answer(request))
+            _send(replies, answer(requests.get()))
         except BrokenPipeError:
             return
+
+
+def _read(requests: "queue.SimpleQueue[Request]") -> None:
+    """Take in requests; where the input ends, the server has ended, and nobody wants an answer.
+
+    It has a thread of its own since whoever solves does not look, and the system ends no process
+    for that its parent has ended.
+    """
+    try:
+        while True:
+            requests.put(pickle.load(sys.stdin.buffer))
+    except EOFError:
+        os._exit(0)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
 
 
 def answer(request: Request) -> Answer:

@@ -28,8 +28,12 @@ class PageThread:
         self._thread.start()
 
     def post(self, deed: Deed, key: object = None) -> None:
-        """Have something done; under a key, in place of what waits under the same."""
+        """Have something done; under a key, in place of what waits under the same.
+
+        It is done after all that was posted before it, wherever what it replaces stood.
+        """
         with self._changed:
+            self._waiting.pop(key, None)
             self._waiting[object() if key is None else key] = deed
             self._changed.notify_all()
 
