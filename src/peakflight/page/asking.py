@@ -191,6 +191,8 @@ class Planner:
             self._shown(shown)
         except Exception:
             _log.exception("a plan could not be shown")
+        with self._changed:
+            self._job = None
 
     def _begin(self) -> _Job | None:
         """Wait for something to do, and take it up; None at the end."""
