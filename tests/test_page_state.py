@@ -34,6 +34,8 @@ def server() -> Iterator[PageServer]:
 def page(server: PageServer) -> Page:
     """The course as it was at first, planned."""
     page = server.page
+    page.limit("speed", 4.9, False)  # an edit takes messages away
+    assert page.thread.settle()
     while page._history.past:
         page.undo()
         assert page.thread.settle()

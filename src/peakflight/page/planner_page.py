@@ -432,14 +432,15 @@ class Page:
 
     def _tick(self) -> None:
         """Wake the page while there is something that moves."""
-        said = False
+        said = pended = False
         while not self._closed.wait(FRAME):
             if self._playback.playing and self._server.get_clients():
                 self._post(self._playback.advance, key="advance")
-            busy = self.planner.busy
-            if (busy is not None and busy > BUSY_AFTER) or said:
-                said = busy is not None and busy > BUSY_AFTER
+            busy, pending = self.planner.busy, not self.planner.idle
+            is_long = busy is not None and busy > BUSY_AFTER
+            if is_long or said or pending is not pended:
                 self._post(self._show_header, key="header")
+            said, pended = is_long, pending
 
     def _failed(self, error: Exception) -> None:
         self._error = _bug(error)
