@@ -153,7 +153,7 @@ class FlightPanel:
             legend={"show": False},
             height=PLOT_HEIGHT,
             padding=(2, 10, 0, 0),
-            order=100.0 + ORDER.get(curve.name, 50),
+            order=BELOW + ORDER.get(curve.name, len(ORDER)),
         )
 
 
@@ -163,6 +163,8 @@ VIEWS = (
     ("rings", "Rings", True, "Rings at the waypoints, facing the way that they are passed."),
 )
 """What can be shown: name, label, whether it is at first, hint."""
+BELOW = 1e9
+"""Place of the first plot: after all that viser has counted, over all pages of a process."""
 ORDER = {"speed": 1, "thrust_acceleration": 2, "jerk": 3, "snap": 4}
 
 
