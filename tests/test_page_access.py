@@ -200,6 +200,12 @@ def test_the_port_in_use_ends_the_command() -> None:
     assert "in use" in done.stderr
 
 
+def as_from_a_terminal() -> None:
+    """Without what `nohup` or a shell's background has signals ignored for."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="no signals")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_signals_end_it_and_its_processes(name: str) -> None:
@@ -208,7 +214,7 @@ def test_signals_end_it_and_its_processes(name: str) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
+        preexec_fn=as_from_a_terminal,  # noqa: PLW1509
     )
     assert process.stdout is not None
     url = json.loads(process.stdout.readline())["url"]

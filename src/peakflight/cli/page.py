@@ -23,6 +23,8 @@ FIRST_COURSE = (
 )
 """m, what the page begins with where no course is named."""
 
+WAKING = 1.0
+"""How often the main thread looks for signals at the latest, s."""
 ENDING = ("SIGTERM", "SIGHUP")
 """Signals that end the page as Ctrl-C does, where the system has them: from whoever stops a
 service, and from a terminal that is closed."""
@@ -90,7 +92,9 @@ def page(
             _announce(server.url, server.is_local, notes, as_json)
             if browse:
                 click.launch(server.url)
-            threading.Event().wait()
+            never = threading.Event()
+            while not never.wait(WAKING):  # a signal just before it waits would not wake it
+                pass
         finally:
             server.close()
     return 0
