@@ -109,6 +109,6 @@ def _as_asked(problem: Problem) -> Problem:
     """
     states = {"start": problem.start, "end": problem.end}
     at_rest: dict[str, Any] = {
-        end: None for end, state in states.items() if state is None or not state.any()
+        end: None for end, state in states.items() if state is None or not np.asarray(state).any()
     }
     return replace(problem, degree=None, continuity=None, **at_rest)
