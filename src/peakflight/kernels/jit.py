@@ -117,8 +117,8 @@ def _hurried() -> Iterator[None]:
     """Compiles sooner, to code as fast.
 
     Without collection of cyclic garbage: the compiler makes millions of objects, of which little is
-    garbage. And at LLVM's second level of optimisation in place of the third; `docs/benchmarks.md`
-    has what that saves, and that nothing runs slower by it. A level in NUMBA_OPT stays.
+    garbage. And at LLVM's second level of optimisation in place of the third (`docs/benchmarks.md`
+    has what that is worth). A level in NUMBA_OPT stays.
     """
     enabled = gc.isenabled()
     level = _config.OPT
