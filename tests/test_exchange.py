@@ -8,7 +8,7 @@ import pytest
 
 import peakflight as pf
 from peakflight import Limits, Trajectory
-from peakflight.methods import joint
+from peakflight.methods import interior_run, joint
 from peakflight.methods.exchange import TRIES, exchanged
 from peakflight.methods.merging import changes, merge, merged
 
@@ -184,7 +184,8 @@ def test_a_time_limit_ends_exchanges(monkeypatch: pytest.MonkeyPatch) -> None:
     before = pf.plan(problem, max_pieces=15, exchanges=0)
     whole = pf.plan(problem, max_pieces=15)
     clock = Ticking()
-    monkeypatch.setattr(joint, "time", clock)
+    for module in (joint, interior_run):
+        monkeypatch.setattr(module, "time", clock)
     short = pf.plan(problem, max_pieces=15, time_limit=400.0)
     assert short.feasible
     assert short.status is pf.Status.TIME_LIMIT

@@ -33,8 +33,6 @@ ENOUGH = 1.003
 SLOWED = 1.02
 """One that is in the end longer by more than this factor than it was without a yaw is looked for
 from other starts too."""
-OTHER_STARTS = ("peak", "proportional")
-"""These."""
 BEGUN = "a plan"
 """What a plan says of a setting that was another plan."""
 
@@ -194,7 +192,7 @@ def _others(problem: Problem, settings: Any) -> list[Any]:
     is_free = getattr(settings, "initial", None) == "guess"
     if not (is_free and problem.limits.rotor_rooms and problem.is_at_rest):
         return []
-    return [replace(settings, initial=start) for start in OTHER_STARTS]
+    return [replace(settings, initial=start) for start in methods.OTHER_STARTS]
 
 
 def _reserving(method: str, problem: Problem, settings: Any) -> tuple[_Answer, float]:

@@ -8,7 +8,7 @@ from there.
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -27,6 +27,8 @@ METHODS = {
 """Name, which is also that of the module, and what it does in a line."""
 DEFAULT_METHOD = "joint"
 """What plans where none is named."""
+OTHER_STARTS: tuple[Literal["peak", "proportional"], ...] = ("peak", "proportional")
+"""From where `joint` begins again if its guess leads to much less than it promised."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,6 +1,7 @@
-"""The class of spline that `joint` takes, and that of the plans by `peak` beside it."""
+"""The class of spline: what `joint` takes, what `peak` takes beside it, what was asked for."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -49,3 +50,18 @@ def without_class(problem: Problem) -> Problem:
     if highest < problem.spline_class.cost_order:
         return replace(problem, degree=None, continuity=None)
     return replace(problem, minimize={highest + 1: 1.0}, degree=None, continuity=None)
+
+
+def as_asked(problem: Problem) -> Problem:
+    """The problem without what a class has filled in, as it stands in a plan and its file.
+
+    A problem from there begins as one does whose class is left to the method.
+    """
+    usual: dict[str, Any] = {"degree": None, "continuity": None}
+    usual |= {end: None for end in ("start", "end") if is_rest(getattr(problem, end))}
+    return replace(problem, **usual)
+
+
+def is_rest(state: Any) -> bool:
+    """Whether the (n, 3) motion at an end of a problem is the usual one: none."""
+    return state is None or not np.asarray(state).any()

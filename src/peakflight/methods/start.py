@@ -1,13 +1,13 @@
 """Motions for `joint` to begin from: a guess, or any trajectory."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from peakflight.kernels import basis
 from peakflight.methods import peak, proportional
-from peakflight.methods.classes import without_class
+from peakflight.methods.classes import as_asked, without_class
 from peakflight.problem import Problem, SplineClass
 from peakflight.result import Plan
 from peakflight.spline import SplineTask
@@ -98,17 +98,5 @@ def given(
     if initial == "guess":
         return None
     method = peak if initial == "peak" else proportional
-    found = method.solve(without_class(_as_asked(problem)), method.Settings())
+    found = method.solve(without_class(as_asked(problem)), method.Settings())
     return start_of(found.trajectory, np.ones(legs, dtype=np.int64), completed)
-
-
-def _as_asked(problem: Problem) -> Problem:
-    """The problem without what a class has filled in, as it stands in a plan file.
-
-    A problem from there begins as one does whose class is left to the method.
-    """
-    states = {"start": problem.start, "end": problem.end}
-    at_rest: dict[str, Any] = {
-        end: None for end, state in states.items() if state is None or not np.asarray(state).any()
-    }
-    return replace(problem, degree=None, continuity=None, **at_rest)

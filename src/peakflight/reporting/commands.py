@@ -7,8 +7,8 @@ from typing import Any
 from peakflight.errors import InvalidProblem
 from peakflight.limits import KINDS, ROTORS
 from peakflight.methods import METHODS, find
+from peakflight.methods.classes import is_rest
 from peakflight.problem import Problem
-from peakflight.reporting.findings import is_rest
 from peakflight.result import PLAIN, Plan
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES

@@ -10,6 +10,7 @@ from peakflight.certificate import certify_plan
 from peakflight.claims import false_claims
 from peakflight.curves import sampled_curves
 from peakflight.errors import PeakflightError
+from peakflight.methods.classes import as_asked
 from peakflight.planner import plan as solve
 from peakflight.result import Plan
 from peakflight.summary import LegSummary, LimitSummary, leg_summaries, limit_summaries
@@ -74,11 +75,6 @@ def find(plan: Plan, claims: Mapping[str, Any] | None = None) -> Findings:
     )
 
 
-def is_rest(state: Any) -> bool:
-    """Whether the (n, 3) motion at an end of a problem is the usual one: none."""
-    return state is None or not np.any(np.asarray(state) != 0.0)
-
-
 def initial_guess(plan: Plan) -> Plan | None:
     """The paper's guess, with the spline that is usual for what the problem minimizes.
 
@@ -86,10 +82,8 @@ def initial_guess(plan: Plan) -> Plan | None:
     """
     if plan.method == GUESS:
         return None
-    usual: dict[str, Any] = {"degree": None, "continuity": None}
-    usual |= {end: None for end in ("start", "end") if is_rest(getattr(plan.problem, end))}
     try:
-        guess = solve(replace(plan.problem, **usual), method=GUESS)
+        guess = solve(as_asked(plan.problem), method=GUESS)
     except PeakflightError:  # a motion that splines cannot have: there is nothing to compare with
         return None
     return guess if guess.feasible else None
