@@ -112,6 +112,12 @@ class Visit:
             time.sleep(0.05)
         mouse.up()
 
+    def reshape(self, width: int, height: int) -> None:
+        """Change the window to a shape that it does not have, in pixels."""
+        before = self.client.camera.aspect
+        self.tab.set_viewport_size({"width": width, "height": height})
+        until(lambda: self.client.camera.aspect != before, "another shape")
+
     def open(self, tab: str) -> None:
         self.tab.get_by_role("tab", name=tab).click()
 
@@ -244,6 +250,23 @@ def test_a_broken_upload_is_refused_with_words_and_all_stays(
     assert "/tmp" not in page.tab.inner_text("[data-file]")
     page.picture(screenshots, "refused")
     assert server.page.edited is before
+
+
+def test_a_view_that_nobody_moved_stays_framed_when_its_window_changes(
+    visit: Callable[..., Visit], server: PageServer
+) -> None:
+    page = visit()
+    waypoints = server.page.edited.waypoints
+    until(lambda: page.sees(waypoints), "the course is framed")
+    for width, height in ((1500, 700), (1000, 900), (1250, 620), (1600, 1000), (1050, 800)):
+        page.reshape(width, height)
+    until(lambda: page.sees(waypoints), "the course is framed again")
+    page.client.camera.position = page.client.camera.position + np.array([80.0, 0.0, 0.0])
+    until(lambda: not page.sees(waypoints), "someone looks elsewhere")
+    elsewhere = page.client.camera.position
+    page.reshape(1400, 700)
+    time.sleep(1.0)
+    assert np.allclose(page.client.camera.position, elsewhere)
 
 
 def test_two_clients_see_the_same_course(visit: Callable[..., Visit], server: PageServer) -> None:

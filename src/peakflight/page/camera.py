@@ -1,5 +1,7 @@
 """Where cameras stand: at first, after another course is loaded, and when asked to show it all."""
 
+from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,13 +20,15 @@ FOV = np.radians(50.0)
 FILLED = 0.8
 """Part of the view, across and upright, that a course fills; the rest is for labels."""
 LEAST = 0.5
-"""How near a camera goes at most, m."""
+"""How near a camera goes to what it shows at most, m."""
 NEAR, FAR = 1e-3, 50.0
 """What is drawn at all, over the distance to the course."""
 USUAL_ASPECT = 0.7
 """Width over height of a view between both panels, for whoever is not there yet."""
 SAME = 1e-3
 """How far a camera may be from where it was put and still count as there, over its distance."""
+RECENT = 8
+"""How many of the places where a camera was put are remembered."""
 
 
 def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.ndarray, np.ndarray]:
@@ -48,7 +52,8 @@ def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.nd
     -----
     A point at r to the right of the middle, u above it and d towards the eye is seen from the
     distance D if |r| <= tan(fov / 2) aspect (D - d) and |u| <= tan(fov / 2) (D - d); the nearest
-    such D, and the middle that allows it, follow from the extremes of d + r / t and d - r / t.
+    such D, and the middle that allows it, follow from the extremes of d + r / t and d - r / t. Where
+    that would be at a point, it is taken farther.
     """
     towards = SIDES[side] / np.linalg.norm(SIDES[side])
     right = np.cross([0.0, 0.0, 1.0], towards)
@@ -56,7 +61,8 @@ def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.nd
     up = np.cross(towards, right)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
     away = points - middle
-    depth, distance = away @ towards, LEAST
+    depth = away @ towards
+    distance = float(depth.max()) + LEAST
     for axis, stretch in ((right, aspect), (up, 1.0)):
         slope = FILLED * np.tan(FOV / 2.0) * stretch
         high = float((depth + away @ axis / slope).max())
@@ -64,6 +70,16 @@ def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.nd
         distance = max(distance, (high + low) / 2.0)
         middle = middle + slope * (high - low) / 2.0 * axis
     return middle + distance * towards, middle
+
+
+@dataclass
+class _Framed:
+    """How a camera was framed last."""
+
+    aspect: float
+    side: str
+    places: deque[np.ndarray]
+    """(3,) m, where it has been put of late: what a browser tells may be older than the last."""
 
 
 class Cameras:
@@ -75,7 +91,7 @@ class Cameras:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._points = np.zeros((1, 3))
-        self._framed: dict[int, tuple[np.ndarray, float, str]] = {}
+        self._framed: dict[int, _Framed] = {}
         server.initial_camera.fov = float(FOV)
         server.on_client_connect(self._came)
         server.on_client_disconnect(self._left)
@@ -100,7 +116,8 @@ class Cameras:
         camera = client.camera
         aspect = camera.aspect
         position, middle = framing(self._points, aspect, side)
-        self._framed[client.client_id] = (position, aspect, side)
+        places = self._framed[client.client_id].places if client.client_id in self._framed else ()
+        self._framed[client.client_id] = _Framed(aspect, side, deque([*places, position], RECENT))
         near, far = _drawn(position, middle)
         with client.atomic():
             camera.fov, camera.near, camera.far = float(FOV), near, far
@@ -118,12 +135,11 @@ class Cameras:
     async def _updated(self, camera: Any) -> None:
         """A camera has moved, or its window has another shape."""
         framed = self._framed.get(camera.client.client_id)
-        if framed is None or camera.aspect == framed[1]:
+        if framed is None or camera.aspect == framed.aspect:
             return
-        position, _, side = framed
-        reach = float(np.linalg.norm(position - camera.look_at))
-        if np.linalg.norm(camera.position - position) < SAME * reach:
-            self._put(camera.client, side)
+        reach = SAME * float(np.linalg.norm(camera.position - camera.look_at))
+        if any(np.linalg.norm(camera.position - place) < reach for place in framed.places):
+            self._put(camera.client, framed.side)
 
 
 def _drawn(position: np.ndarray, middle: np.ndarray) -> tuple[float, float]:
