@@ -328,10 +328,12 @@ def test_the_vehicle_is_drawn_where_it_is_and_as_it_leans(vehicle: str | None) -
             assert max(one.max() for one in curve.values) <= limit * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("path", sorted(COURSES.glob("*.*")), ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path",
+    sorted(path for path in COURSES.iterdir() if path.name != "README.md"),
+    ids=lambda path: path.name,
+)
 def test_every_course_comes_in_as_from_the_command_line(path: Path) -> None:
-    if path.name == "README.md":
-        pytest.skip("no course")
     loaded, _ = files.load_upload(path.name, path.read_bytes(), edited())
     course, _ = pf.tidy(pf.read_course(path))
     assert np.array_equal(loaded.waypoints, course.waypoints)

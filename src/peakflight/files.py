@@ -108,7 +108,12 @@ def parse_json(text: str, path: PathLike) -> Any:
 
 def write_json(path: PathLike, value: Any) -> None:
     """Store `value` as JSON that reads back without loss."""
-    write_atomically(path, json.dumps(value, allow_nan=False) + "\n")
+    write_atomically(path, json_text(value))
+
+
+def json_text(value: Any) -> str:
+    """The JSON of `value`, in a line."""
+    return json.dumps(value, allow_nan=False) + "\n"
 
 
 def _refuse_constant(name: str) -> float:

@@ -189,7 +189,7 @@ class Planner:
         )
         try:
             self._shown(shown)
-        except Exception:
+        except Exception:  # drawing may fail; the thread must live on to plan what is asked next
             _log.exception("a plan could not be shown")
         with self._changed:
             self._job = None

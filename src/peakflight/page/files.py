@@ -9,6 +9,7 @@ from pathlib import Path
 from peakflight.course import tidy
 from peakflight.errors import InvalidFile, InvalidProblem, PeakflightError
 from peakflight.exporting import ExportReport, export
+from peakflight.files import json_text
 from peakflight.formats import FLIGHT_FORMATS, read_course
 from peakflight.page.edited import Edited
 from peakflight.result import Plan
@@ -82,7 +83,7 @@ def course_csv(edited: Edited) -> bytes:
 
 def plan_json(plan: Plan) -> bytes:
     """The plan file."""
-    return (json.dumps(plan.to_dict(), allow_nan=False) + "\n").encode()
+    return json_text(plan.to_dict()).encode()
 
 
 def report(plan: Plan, name: str) -> bytes:

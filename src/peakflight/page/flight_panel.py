@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from peakflight.page import colours
+from peakflight.page.callbacks import alone, with_client, with_value
 from peakflight.page.camera import SIDES, USUAL
 from peakflight.page.drawing import Curve, Drawing
 from peakflight.page.header import speed_legend
@@ -68,18 +69,18 @@ class FlightPanel:
             with server.gui.add_folder("Show", expand_by_default=False):
                 for name, label, on, hint in VIEWS:
                     box = server.gui.add_checkbox(label, on, hint=hint)
-                    box.on_update(_from_client(partial(viewed, name)))
+                    box.on_update(with_value(partial(viewed, name)))
         panel.dock_left()
         panel.set_width(WIDTH)
         self.playing = False
-        self._play.on_click(_clicked(lambda: played(not self.playing)))
-        self._slider.on_update(_from_client(sought))
-        self._pace.on_update(_from_client(lambda value: paced(SPEEDS[value])))
-        view.on_click(_to_client(lambda event: fitted(event.target.value, event.client)))
+        self._play.on_click(alone(lambda: played(not self.playing)))
+        self._slider.on_update(with_value(sought))
+        self._pace.on_update(with_value(lambda value: paced(SPEEDS[value])))
+        view.on_click(with_client(lambda client: fitted(view.value, client)))
         command = server.gui.add_command("Play or stop", hotkey="space")
-        command.on_trigger(_clicked(lambda: played(not self.playing)))
+        command.on_trigger(alone(lambda: played(not self.playing)))
         command = server.gui.add_command("Fit view", hotkey="F")
-        command.on_trigger(_to_client(lambda event: fitted(USUAL, event.client)))
+        command.on_trigger(with_client(partial(fitted, USUAL)))
 
     def set_playing(self, playing: bool) -> None:
         """Say whether it plays."""
@@ -176,31 +177,3 @@ def _data(times: np.ndarray, curve: Curve, seconds: float) -> tuple[tuple[np.nda
     at = min(int(np.searchsorted(times, seconds)), len(times) - 2)
     mark[at : at + 2] = (0.0, top)
     return (times, *curve.values, *lines, mark), top
-
-
-def _from_client(deed: Callable[[Any], None]) -> Callable[[Any], Any]:
-    """A callback of a widget: of what people change, not of what the page sets."""
-
-    async def callback(event: Any) -> None:
-        if event.client is not None:
-            deed(event.target.value)
-
-    return callback
-
-
-def _clicked(deed: Callable[[], None]) -> Callable[[Any], Any]:
-    async def callback(event: Any) -> None:
-        del event
-        deed()
-
-    return callback
-
-
-def _to_client(deed: Callable[[Any], None]) -> Callable[[Any], Any]:
-    """A callback of what is done to whoever asks."""
-
-    async def callback(event: Any) -> None:
-        if event.client is not None:
-            deed(event)
-
-    return callback

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import viser
 
 from peakflight.limits import GRAVITY, KINDS, ROTORS, LimitKind, Limits, plain_unit
+from peakflight.page.callbacks import with_value
 from peakflight.page.edited import Edited
 
 
@@ -74,8 +76,8 @@ class LimitsPanel:
                 hint=given.hint,
                 visible=False,
             )
-            self._boxes[kind.name].on_update(self._ticked(kind))
-            self._sliders[kind.name].on_update(self._slid(kind))
+            self._boxes[kind.name].on_update(with_value(partial(self._ticked, kind)))
+            self._sliders[kind.name].on_update(with_value(partial(self._slid, kind)))
 
     def show(self, edited: Edited) -> None:
         """Set boxes and sliders to the limits of what is edited."""
@@ -107,16 +109,9 @@ class LimitsPanel:
             high = _bound(kind, WIDEN * value)
         return min(low, value), high, step
 
-    def _ticked(self, kind: LimitKind) -> Callable[[Any], Any]:
-        async def callback(event: Any) -> None:
-            if event.client is None or self._edited is None:
-                return
-            if not event.target.value:
-                self._changed(kind.name, None, False)
-                return
-            self._changed(kind.name, self._usual(kind), False)
-
-        return callback
+    def _ticked(self, kind: LimitKind, on: bool) -> None:
+        if self._edited is not None:
+            self._changed(kind.name, self._usual(kind) if on else None, False)
 
     def _usual(self, kind: LimitKind) -> float:
         """Where a limit begins that was not set: as the vehicle has it by default, or as usual."""
@@ -126,12 +121,8 @@ class LimitsPanel:
             return float(getattr(own, kind.name))
         return _si(kind, RANGES[kind.name].usual)
 
-    def _slid(self, kind: LimitKind) -> Callable[[Any], Any]:
-        async def callback(event: Any) -> None:
-            if event.client is not None:
-                self._changed(kind.name, _si(kind, float(event.target.value)), True)
-
-        return callback
+    def _slid(self, kind: LimitKind, value: float) -> None:
+        self._changed(kind.name, _si(kind, value), True)
 
 
 def _shown(kind: LimitKind, value: float) -> float:

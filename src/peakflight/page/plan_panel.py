@@ -1,7 +1,6 @@
 """The panel of the plan: header, undo, the chosen waypoint, limits, method, legs, files."""
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any, Protocol
 
@@ -10,6 +9,7 @@ import viser
 
 from peakflight.formats import FLIGHT_FORMATS
 from peakflight.methods import METHODS
+from peakflight.page.callbacks import alone, with_client, with_value
 from peakflight.page.drawing import Drawing
 from peakflight.page.edited import COSTS, Edited, Pieces
 from peakflight.page.header import Summary, course_line, header, legs_table, message
@@ -70,14 +70,16 @@ class PlanPanel:
         steps = gui.add_button_group(
             "Edits", ("Undo", "Redo"), hint="Take the last edit back, or bring it again."
         )
-        steps.on_click(_value(lambda word: actions.undo() if word == "Undo" else actions.redo()))
+        steps.on_click(
+            with_value(lambda word: actions.undo() if word == "Undo" else actions.redo())
+        )
         self._accept = gui.add_button(
             "Accept this plan",
             color="teal",
             icon=viser.Icon.CHECK,
             hint="Keep it, in grey, to compare what you change next with it.",
         )
-        self._accept.on_click(_click(actions.accept))
+        self._accept.on_click(alone(actions.accept))
         self._cancel = gui.add_button(
             "Stop planning",
             icon=viser.Icon.X,
@@ -85,7 +87,7 @@ class PlanPanel:
             visible=False,
             hint="Stop the solve at hand; what is drawn stays.",
         )
-        self._cancel.on_click(_click(actions.cancel))
+        self._cancel.on_click(alone(actions.cancel))
         tabs = gui.add_tab_group()
         with tabs.add_tab("Course"):
             self._course_tab(gui)
@@ -105,7 +107,7 @@ class PlanPanel:
             ("Undo", "Z", "cmd/ctrl", actions.undo),
             ("Redo", "Y", "cmd/ctrl", actions.redo),
         ):
-            gui.add_command(label, hotkey=key, modifier=modifier).on_trigger(_click(deed))
+            gui.add_command(label, hotkey=key, modifier=modifier).on_trigger(alone(deed))
 
     def _course_tab(self, gui: Any) -> None:
         do = self._do
@@ -113,35 +115,37 @@ class PlanPanel:
         self._index = gui.add_number(
             "Waypoint", 0, min=0, max=1, step=1, hint="The chosen one; or click a ball."
         )
-        self._index.on_update(_value(lambda index: do.choose(int(index))))
+        self._index.on_update(with_value(lambda index: do.choose(int(index))))
         self._position = gui.add_vector3(
             "x, y, z (m)", (0.0, 0.0, 0.0), step=0.01, hint="Where it is; z is up."
         )
-        self._position.on_update(_value(do.place))
+        self._position.on_update(with_value(do.place))
         self._yaw = gui.add_number(
             "Yaw (°)", 0.0, step=1.0, hint="Where the nose points there; turns yaw at waypoints on."
         )
-        self._yaw.on_update(_value(lambda degrees: do.turn(float(degrees))))
+        self._yaw.on_update(with_value(lambda degrees: do.turn(float(degrees))))
         adds = gui.add_button_group(
             "Add",
             ("After it", "At the end"),
             hint="A waypoint in the middle of the next leg, or beyond the last one.",
         )
-        adds.on_click(_value(lambda word: do.insert_after() if word == "After it" else do.append()))
+        adds.on_click(
+            with_value(lambda word: do.insert_after() if word == "After it" else do.append())
+        )
         order = gui.add_button_group(
             "Order", ("Earlier", "Later"), hint="Pass it one place earlier or later."
         )
-        order.on_click(_value(lambda word: do.shift(-1 if word == "Earlier" else 1)))
+        order.on_click(with_value(lambda word: do.shift(-1 if word == "Earlier" else 1)))
         gui.add_button(
             "Delete it", icon=viser.Icon.TRASH, color="gray", hint="Take the chosen waypoint out."
-        ).on_click(_click(do.delete))
+        ).on_click(alone(do.delete))
         click = gui.add_checkbox(
             "Add by clicking",
             False,
             hint="A click on the path adds a waypoint to that leg; elsewhere, at the end of the "
             "course, at the height of its last waypoint. Ctrl-click does so at any time.",
         )
-        click.on_update(_value(do.add_by_click))
+        click.on_update(with_value(do.add_by_click))
         self._ground = gui.add_markdown("")
 
     def _limits_tab(self, server: viser.ViserServer) -> None:
@@ -152,14 +156,16 @@ class PlanPanel:
             initial_value=NO_VEHICLE,
             hint="What flies. It brings limits that it can keep, which you can change below.",
         )
-        self._vehicle.on_update(_value(lambda name: do.fly(None if name == NO_VEHICLE else name)))
+        self._vehicle.on_update(
+            with_value(lambda name: do.fly(None if name == NO_VEHICLE else name))
+        )
         self._rotors = gui.add_button(
             "Limit its rotors themselves",
             visible=False,
             hint="Rotor thrusts and body rate in place of the limits that stand for them: faster, "
             "with nothing left for control.",
         )
-        self._rotors.on_click(_click(do.rotors_alone))
+        self._rotors.on_click(alone(do.rotors_alone))
         self._limits = LimitsPanel(server, do.limit)
 
     def _method_tab(self, gui: Any) -> None:
@@ -170,21 +176,21 @@ class PlanPanel:
             initial_value="joint",
             hint="; ".join(f"{name}: {what}" for name, what in METHODS.items()),
         )
-        self._method.on_update(_value(lambda name: do.plan_by(method=name)))
+        self._method.on_update(with_value(lambda name: do.plan_by(method=name)))
         self._pieces = gui.add_dropdown(
             "Pieces a leg",
             tuple(PIECES),
             initial_value="where it pays",
             hint="Polynomials in each leg, of method joint: more fly faster and make larger files.",
         )
-        self._pieces.on_update(_value(lambda word: do.plan_by(pieces=PIECES[word])))
+        self._pieces.on_update(with_value(lambda word: do.plan_by(pieces=PIECES[word])))
         self._cost = gui.add_dropdown(
             "Cost",
             COSTS,
             initial_value="jerk",
             hint="What splines keep small, and what smoothness weighs.",
         )
-        self._cost.on_update(_value(lambda word: do.plan_by(minimize=word)))
+        self._cost.on_update(with_value(lambda word: do.plan_by(minimize=word)))
         self._effort = gui.add_number(
             "Smoothness",
             0.0,
@@ -192,7 +198,7 @@ class PlanPanel:
             step=0.0001,
             hint="Weight of the cost beside the time, of method joint: 0 is the fastest.",
         )
-        self._effort.on_update(_value(lambda weight: do.plan_by(effort=float(weight))))
+        self._effort.on_update(with_value(lambda weight: do.plan_by(effort=float(weight))))
         self._policy = gui.add_dropdown(
             "Yaw",
             tuple(YAWS),
@@ -204,7 +210,7 @@ class PlanPanel:
             "Point (m)", (0.0, 0.0, 0.0), step=0.1, visible=False, hint="What the nose looks at."
         )
         for widget in (self._policy, self._angle, self._point):
-            widget.on_update(_value(lambda _: self._head()))
+            widget.on_update(with_value(lambda _: self._head()))
 
     def _head(self) -> None:
         self._do.head(YAWS[self._policy.value], float(self._angle.value), self._point.value)
@@ -217,29 +223,25 @@ class PlanPanel:
             icon=viser.Icon.UPLOAD,
             hint="A course as CSV (x,y,z a line), YAML or JSON, or a plan.json.",
         )
-
-        async def uploaded(event: Any) -> None:
-            given = event.target.value
-            do.load(given.name, given.content, event.client)
-
-        upload.on_upload(uploaded)
-
+        upload.on_upload(
+            with_client(lambda client: do.load(upload.value.name, upload.value.content, client))
+        )
         for label, what, hint in SAVES:
             gui.add_button(label, icon=viser.Icon.DOWNLOAD, hint=hint).on_click(
-                _client(partial(do.save, what))
+                with_client(partial(do.save, what))
             )
         names = tuple(FLIGHT_FORMATS)
         self._format = gui.add_dropdown(
             "Flight file", names, initial_value="crazyswarm", hint="What is to fly it, or read it."
         )
         self._about = gui.add_markdown("")
-        self._format.on_update(_value(self._explain))
+        self._format.on_update(with_value(self._explain))
         self._explain(self._format.value)
         gui.add_button(
             "Export the flight file",
             icon=viser.Icon.FILE_EXPORT,
             hint="Written, read back as its consumer reads it, and proven again.",
-        ).on_click(_client(lambda client: do.save(f"export:{self._format.value}", client)))
+        ).on_click(with_client(lambda client: do.save(f"export:{self._format.value}", client)))
 
     def _explain(self, name: str) -> None:
         self._about.content = FLIGHT_FORMATS[name].summary
@@ -321,30 +323,3 @@ SAVES = (
     ("Save the plan (plan.json)", "plan", "Everything, with the proof; peakflight check reads it."),
 )
 """Label, what is saved, hint."""
-
-
-def _value(deed: Callable[[Any], None]) -> Callable[[Any], Any]:
-    """A callback with the new value: of what people change, not of what the page sets."""
-
-    async def callback(event: Any) -> None:
-        if event.client is not None:
-            deed(event.target.value)
-
-    return callback
-
-
-def _click(deed: Callable[[], None]) -> Callable[[Any], Any]:
-    async def callback(event: Any) -> None:
-        del event
-        deed()
-
-    return callback
-
-
-def _client(deed: Callable[[Any], None]) -> Callable[[Any], Any]:
-    """A callback with who it was."""
-
-    async def callback(event: Any) -> None:
-        deed(event.client)
-
-    return callback

@@ -22,7 +22,6 @@ from peakflight.page.access import Access, guarded, is_loopback
 from peakflight.page.edited import Edited
 from peakflight.page.planner_page import Page
 
-DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
 BRAND = (43, 108, 176)
 
 
@@ -37,9 +36,7 @@ class _Server(viser.ViserServer):  # type: ignore[misc]
 class PageServer:
     """A page that is served, and the address that it has."""
 
-    def __init__(
-        self, edited: Edited, *, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT
-    ) -> None:
+    def __init__(self, edited: Edited, *, port: int, host: str = "127.0.0.1") -> None:
         """Serve a course.
 
         Raises

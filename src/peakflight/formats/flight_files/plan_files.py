@@ -1,14 +1,13 @@
 """The plan itself, as JSON and as arrays of NumPy: nothing is rounded."""
 
 import io
-import json
 import zipfile
 from typing import Any
 
 import numpy as np
 
 from peakflight.errors import InvalidFile, InvalidProblem
-from peakflight.files import parse_json
+from peakflight.files import json_text, parse_json
 from peakflight.formats.flight_files.flight_format import (
     Encoded,
     FlightFormat,
@@ -28,7 +27,7 @@ EXACT = Precision(position=1e-12)
 def encode_json(plan: Plan, name: str = "") -> Encoded:
     """The plan file; the name does not appear in it."""
     del name
-    return Encoded((json.dumps(plan.to_dict(), allow_nan=False) + "\n").encode())
+    return Encoded(json_text(plan.to_dict()).encode())
 
 
 def decode_json(data: bytes) -> tuple[Reading, ...]:
