@@ -52,8 +52,8 @@ def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.nd
     -----
     A point at r to the right of the middle, u above it and d towards the eye is seen from the
     distance D if |r| <= tan(fov / 2) aspect (D - d) and |u| <= tan(fov / 2) (D - d); the nearest
-    such D, and the middle that allows it, follow from the extremes of d + r / t and d - r / t. Where
-    that would be at a point, it is taken farther.
+    such D, and the middle that allows it, follow from the extremes of d + r / t and d - r / t.
+    Where that would be at a point, it is taken farther.
     """
     towards = SIDES[side] / np.linalg.norm(SIDES[side])
     right = np.cross([0.0, 0.0, 1.0], towards)
