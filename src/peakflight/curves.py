@@ -4,6 +4,7 @@ import numpy as np
 
 from peakflight.airframe import Airframe
 from peakflight.limits import KINDS, LARGEST, ROTORS, LimitKind, Limits, limited_values
+from peakflight.result import BINDING, Plan
 from peakflight.trajectory import Trajectory
 
 ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
@@ -61,6 +62,28 @@ def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind
         for kind in KINDS
         if kind.name in ALWAYS or (kind in limits.active and kind.name in curves)
     ]
+
+
+def peaks(
+    plan: Plan, kind: LimitKind, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where segments reach their limit or exceed it, by the certificate.
+
+    Parameters
+    ----------
+    values
+        (K, n), the samples of what the kind limits.
+
+    Returns
+    -------
+    tuple of ndarray
+        (m,) segments, (m,) the sample of each that is nearest to its peak, and (m,) kappa there.
+    """
+    kappa = plan.report.peaks.get(kind.name, np.zeros(len(values)))
+    segments = np.flatnonzero(kappa >= BINDING)
+    rows = values[segments]
+    places = rows.argmin(axis=1) if kind.is_least else rows.argmax(axis=1)
+    return segments, places, kappa[segments]
 
 
 def _count(trajectory: Trajectory) -> int:

@@ -8,8 +8,14 @@ SAME_PLACE = 1e-6
 """Waypoints that are no further apart share a label, relative to the size of the course."""
 MOST_LABELS = 25
 """With more waypoints than this, only every second, fifth, tenth, ... is numbered."""
-MOST_NUMBERS = 5
+MOST_OF_A_PLACE = 5
 """A place that is passed more often lists its first numbers only."""
+MOST_BORDERS = 60
+"""With more legs, only the borders of every second, fifth, ... are drawn against time."""
+MOST_LEGS = 40
+"""With more legs, only every second, fifth, ... is numbered there."""
+FAR = 4.0
+"""A limit that is further beyond the curves than this is named, but not drawn to scale."""
 
 
 def waypoint_texts(waypoints: np.ndarray) -> dict[int, str]:
@@ -36,13 +42,24 @@ def waypoint_texts(waypoints: np.ndarray) -> dict[int, str]:
 
 def _list(numbers: Sequence[int], last: int) -> str:
     names = {0: "0 start", last: f"{last} end"}
-    shown = [number for number in numbers[:MOST_NUMBERS] if number != last]
+    shown = [number for number in numbers[:MOST_OF_A_PLACE] if number != last]
     words = [names.get(number, str(number)) for number in shown]
-    if len(numbers) > MOST_NUMBERS:
+    if len(numbers) > MOST_OF_A_PLACE:
         words.append("…")
     if last in numbers:
         words.append(names[last])
     return ", ".join(words)
+
+
+def drawn_borders(passed: np.ndarray) -> np.ndarray:
+    """Of the times at which waypoints are passed, s, those between legs, as many as can be seen."""
+    inner = passed[1:-1]
+    return inner[:: even_step(len(inner), MOST_BORDERS)]
+
+
+def numbered_legs(count: int) -> range:
+    """Of so many legs, those that are numbered against time."""
+    return range(0, count, even_step(count, MOST_LEGS))
 
 
 def even_step(count: int, most: int) -> int:

@@ -38,6 +38,20 @@ class LimitKind(NamedTuple):
     label: str
     """For tables and axes."""
 
+    @property
+    def is_least(self) -> bool:
+        """Whether it limits from below."""
+        return self.name in LEASTS
+
+    @property
+    def shown_unit(self) -> str:
+        """What people read it in: degrees for angles."""
+        return "°" if self.unit == "rad" else plain_unit(self.unit)
+
+    def shown(self, value: Any) -> Any:
+        """A value, or an array of them, in that unit."""
+        return np.degrees(value) if self.unit == "rad" else value
+
 
 KINDS = (
     LimitKind("speed", "m/s", 1, "speed"),
@@ -56,6 +70,8 @@ LABELS = {kind.name: kind.label for kind in KINDS}
 """Name of a limit to what it is called in tables and on axes."""
 _INDEX = {kind.name: index for index, kind in enumerate(KINDS)}
 
+LEASTS = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
+"""Name of a limit from below to that from above on the same."""
 ROTORS = ("rotor_thrust", "least_rotor_thrust")
 """Limits that are about an airframe."""
 BOUNDING = ("speed", "thrust_acceleration", "jerk", "snap", "rotor_thrust")
@@ -234,8 +250,7 @@ class Limits:
                     hover = self.airframe.mass * GRAVITY / 4.0
                     found[kind.name] = np.maximum((hover - value) / (hover - limit), 0.0)
                 else:
-                    from_below = kind.name.startswith("least_")
-                    found[kind.name] = limit / value if from_below else value / limit
+                    found[kind.name] = limit / value if kind.is_least else value / limit
         return found
 
     def attained(self, kind: LimitKind, ratio: float) -> float | None:
@@ -249,7 +264,7 @@ class Limits:
         if kind.name == "least_rotor_thrust" and self.airframe is not None:
             hover = self.airframe.mass * GRAVITY / 4.0
             return hover - ratio * (hover - limit)
-        if kind.name.startswith("least_"):
+        if kind.is_least:
             return limit / ratio if ratio > 0.0 else None
         return limit * ratio
 
@@ -318,7 +333,7 @@ def limited_values(
 
 def keeps(name: str, value: float, limit: float) -> bool:
     """Whether a value of a kind keeps its limit: from below for what is least."""
-    return value >= limit if name.startswith("least_") else value <= limit
+    return value >= limit if name in LEASTS else value <= limit
 
 
 def plain_unit(unit: str) -> str:

@@ -35,7 +35,7 @@ def rotor_notes(problem: Problem) -> tuple[str, ...]:
     if not problem.limits.on_rotors:
         return ()
     nose = "the yaw of the plan" if problem.heading else "a heading that does not twist"
-    return (f"rotor thrusts are proven for {nose}, with drag",)
+    return (f"rotor thrusts are proven for {nose}, with drag and unequal inertia",)
 
 
 def ratio_cells(ratio: float) -> tuple[str, str, str]:

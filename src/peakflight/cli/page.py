@@ -13,6 +13,7 @@ from peakflight.cli.output import print_json
 from peakflight.course import Course
 from peakflight.limits import PAPER_LIMITS, Limits
 from peakflight.vehicle import Vehicle
+from peakflight.wording import written
 
 FIRST_COURSE = (
     (0.0, 0.0, 1.0),
@@ -33,7 +34,10 @@ service, and from a terminal that is closed."""
 @click.command(short_help="Edit a course in the browser, and see the fastest flight change.")
 @click.argument("course", type=click.Path(path_type=Path), required=False)
 @vehicle_option
-@limits_option("Limits to begin with.", default=PAPER_LIMITS)
+@limits_option(
+    "Limits to begin with.",
+    otherwise=f"those of the plan or vehicle, else the paper's {written(PAPER_LIMITS, ', ')}",
+)
 @click.option(
     "--host",
     default="127.0.0.1",

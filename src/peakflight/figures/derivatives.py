@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from peakflight.curves import sampled_curves, shown_kinds
+from peakflight.curves import peaks, sampled_curves, shown_kinds
 from peakflight.figures.canvas import (
     POINTS,
     TEXT,
@@ -21,10 +21,10 @@ from peakflight.figures.canvas import (
     write_limit,
     write_note,
 )
-from peakflight.labelling import even_step
-from peakflight.limits import LimitKind, plain_unit
+from peakflight.labelling import FAR, drawn_borders, numbered_legs
+from peakflight.limits import LimitKind
 from peakflight.palette import FAINT, INK, LIMIT, SOFT
-from peakflight.result import BINDING, Plan
+from peakflight.result import Plan
 
 PANEL = 1.05
 """Height of a panel, in."""
@@ -35,12 +35,6 @@ LEFT, RIGHT, BOTTOM, TOP = 0.92, 0.85, 0.45, 0.55
 HEADROOM = 1.15
 """Height of a panel's axis, relative to what it shows."""
 KEY = "○ limit binds   × limit exceeded"  # noqa: RUF001
-FAR = 4.0
-"""A limit that is further above the curve than this is named, but not drawn to scale."""
-MOST_BORDERS = 60
-"""With more legs, only the borders of every second, fifth, ... are drawn."""
-MOST_NUMBERS = 40
-"""With more legs, only every second, fifth, ... is numbered."""
 
 
 def derivatives_figure(plan: Plan) -> Figure:
@@ -62,8 +56,7 @@ def derivatives_figure(plan: Plan) -> Figure:
         limit = getattr(limits, kind.name)
         scale_panel(axes, kind, limit, times=span(times), highest=float(values.max()))
         if limit is not None:
-            kappa = plan.report.peaks.get(kind.name, np.zeros(len(trajectory)))
-            _mark_peaks(axes, times, values, kappa, least=kind.name.startswith("least"))
+            _mark_peaks(axes, plan, kind, times, values)
         draw_borders(axes, plan.waypoint_times)
     number_legs(panels[0], plan.waypoint_times)
     return figure
@@ -103,9 +96,7 @@ def scale_panel(
     highest
         Of the curves, in the unit of the kind, but tilt in degrees.
     """
-    unit = plain_unit(kind.unit)
-    if kind.unit == "rad":
-        unit, limit = "°", None if limit is None else float(np.degrees(limit))
+    unit, limit = kind.shown_unit, None if limit is None else kind.shown(limit)
     top = max(highest, 1e-12)
     if limit is not None:
         draw_limit(axes, limit)
@@ -122,16 +113,11 @@ def scale_panel(
 
 
 def _mark_peaks(
-    axes: Axes, times: np.ndarray, values: np.ndarray, kappa: np.ndarray, *, least: bool
+    axes: Axes, plan: Plan, kind: LimitKind, times: np.ndarray, values: np.ndarray
 ) -> None:
-    rows = np.arange(len(values))
-    columns = values.argmin(axis=1) if least else values.argmax(axis=1)
-    above = kappa > 1.0
-    for chosen, marker, colour in (
-        ((kappa >= BINDING) & ~above, "o", "white"),
-        (above, "x", LIMIT),
-    ):
-        at = rows[chosen], columns[chosen]
+    segments, places, kappa = peaks(plan, kind, values)
+    for chosen, marker, colour in ((kappa <= 1.0, "o", "white"), (kappa > 1.0, "x", LIMIT)):
+        at = segments[chosen], places[chosen]
         axes.plot(
             times[at],
             values[at],
@@ -148,9 +134,7 @@ def _mark_peaks(
 
 def draw_borders(axes: Axes, borders: np.ndarray) -> None:
     """Draw a line at each border of a leg, as many as can be told apart; borders in s."""
-    inner = borders[1:-1]
-    inner = inner[:: even_step(len(inner), MOST_BORDERS)]
-    lines = [[(time, 0.0), (time, 1.0)] for time in inner]
+    lines = [[(time, 0.0), (time, 1.0)] for time in drawn_borders(borders)]
     axes.add_collection(
         LineCollection(
             lines,
@@ -165,11 +149,10 @@ def draw_borders(axes: Axes, borders: np.ndarray) -> None:
 
 def number_legs(axes: Axes, borders: np.ndarray) -> None:
     """Write the number of each leg above its middle, as far as there is room."""
-    legs = len(borders) - 1
     points = POINTS * (WIDTH - LEFT - RIGHT) / (borders[-1] - borders[0])
     free = -np.inf
     transform = axes.get_xaxis_transform()
-    for leg in range(0, legs, even_step(legs, MOST_NUMBERS)):
+    for leg in numbered_legs(len(borders) - 1):
         text = str(leg)
         middle, half = 0.5 * (borders[leg] + borders[leg + 1]), 0.5 * text_width(text) / points
         if middle - half < free:

@@ -22,7 +22,7 @@ from peakflight.figures.derivatives import (
 from peakflight.figures.flights import LEGEND_ROW, LEGEND_TOP, looks
 from peakflight.figures.overlaid_derivatives import ABOVE, CUT
 from peakflight.figures.paths import SIDE_WIDTH
-from peakflight.limits import KINDS, plain_unit
+from peakflight.limits import KINDS
 from peakflight.palette import INK, LIMIT
 from peakflight.result import Plan
 
@@ -133,8 +133,7 @@ def _derivatives(lines: Sequence[_Line], title: str) -> Figure:
             shown = min(shown, CUT * limit)
         scale_panel(axes, kind, limit, times=(0.0, end), highest=shown)
         _draw_crashes(axes, lines)
-        unit = "°" if kind.unit == "rad" else plain_unit(kind.unit)
-        _tell_higher(axes, max(tops), shown, unit)
+        _tell_higher(axes, max(tops), shown, kind.shown_unit)
     _name(figure, lines)
     return figure
 

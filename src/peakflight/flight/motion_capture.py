@@ -279,7 +279,7 @@ def _peaks(curves: Mapping[str, Curve], plan: Plan) -> dict[str, Peak]:
 
 def _ratio(kind: LimitKind, value: float, limit: float) -> float:
     """How much of a limit a value takes up."""
-    if kind.name.startswith("least"):
+    if kind.is_least:
         return min(limit / max(value, limit / UNBOUNDED), UNBOUNDED)
     return value / limit
 
@@ -290,7 +290,7 @@ def _extreme(
     """The largest value, or the least of what is limited from below; and when."""
     if not np.isfinite(values).any():
         return None, None
-    place = int(np.nanargmin(values) if kind.name.startswith("least") else np.nanargmax(values))
+    place = int(np.nanargmin(values) if kind.is_least else np.nanargmax(values))
     return float(values[place]), float(times[place])
 
 

@@ -1,13 +1,13 @@
 """What is drawn of a plan, as plain arrays: the path and its colours, curves, legs, the vehicle."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from peakflight.limits import KINDS, limited_values, plain_unit
+from peakflight.curves import ALWAYS
+from peakflight.limits import KINDS, LEASTS, limited_values
 from peakflight.page import states
 from peakflight.page.colours import along_scale
 from peakflight.result import BINDING, Plan
@@ -18,10 +18,6 @@ CURVE_POINTS = 361
 """Of each plot: about one a pixel."""
 AT_LIMIT = 0.995
 """Of a limit, from where on it counts as flown at."""
-ALWAYS = ("speed", "thrust_acceleration", "jerk", "snap")
-"""Plots that are always there, limited or not."""
-PAIRED = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
-"""Limits from below, which are drawn with what they are the least of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +152,10 @@ class Drawing:
         values = limited_values(derivatives)
         curves = []
         for kind in KINDS:
-            limit = getattr(limits, kind.name)
-            if kind.name in PAIRED or (limit is None and kind.name not in ALWAYS):
+            kinds = (kind.name, *(least for least, of in LEASTS.items() if of == kind.name))
+            bounds = [getattr(limits, name) for name in kinds]
+            lines = tuple(float(kind.shown(bound)) for bound in bounds if bound is not None)
+            if kind.is_least or not (lines or kind.name in ALWAYS):
                 continue
             if kind.name == "rotor_thrust":
                 shown: tuple[np.ndarray, ...] = tuple(
@@ -165,16 +163,8 @@ class Drawing:
                     for thrust in self.states.rotor_thrust.T
                 )
             else:
-                shown = (values[kind.name],)
-            bounds = [limit] + [
-                getattr(limits, low) for low, of in PAIRED.items() if of == kind.name
-            ]
-            lines = tuple(float(bound) for bound in bounds if bound is not None)
-            unit = plain_unit(kind.unit)
-            if kind.unit == "rad":
-                shown, unit = tuple(np.degrees(one) for one in shown), "°"
-                lines = tuple(math.degrees(line) for line in lines)
-            title = f"{kind.label[0].upper()}{kind.label[1:]} ({unit})"
+                shown = (kind.shown(values[kind.name]),)
+            title = f"{kind.label[0].upper()}{kind.label[1:]} ({kind.shown_unit})"
             curves.append(Curve(kind.name, title, shown, lines))
         return tuple(curves)
 

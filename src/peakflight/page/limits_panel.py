@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from peakflight.limits import GRAVITY, KINDS, ROTORS, LimitKind, Limits, plain_unit
+from peakflight.limits import GRAVITY, KINDS, ROTORS, LimitKind, Limits
 from peakflight.page.callbacks import with_value
 from peakflight.page.edited import Edited
 
@@ -61,14 +61,14 @@ class LimitsPanel:
         self._sliders: dict[str, Any] = {}
         for kind in KINDS:
             given = RANGES[kind.name]
-            bound = "at least" if kind.name.startswith("least") else "at most"
+            bound = "at least" if kind.is_least else "at most"
             self._boxes[kind.name] = server.gui.add_checkbox(
                 f"{kind.label[0].upper()}{kind.label[1:]}",
                 False,
                 hint=f"{given.hint} Untick to lift.",
             )
             self._sliders[kind.name] = server.gui.add_slider(
-                f"{bound} ({plain_unit('°' if kind.unit == 'rad' else kind.unit)})",
+                f"{bound} ({kind.shown_unit})",
                 given.low,
                 given.high,
                 given.step,
@@ -90,7 +90,7 @@ class LimitsPanel:
             slider.visible = value is not None
             if value is None:
                 continue
-            shown = _shown(kind, value)
+            shown = float(kind.shown(value))
             low, high, step = self._range(kind, edited, shown)
             slider.min, slider.max, slider.step = low, high, step
             slider.value = shown
@@ -125,12 +125,8 @@ class LimitsPanel:
         self._changed(kind.name, _si(kind, value), True)
 
 
-def _shown(kind: LimitKind, value: float) -> float:
-    """A value of a kind in the unit that is shown."""
-    return math.degrees(value) if kind.unit == "rad" else value
-
-
 def _si(kind: LimitKind, value: float) -> float:
+    """A value that is shown, in the unit of the kind."""
     return math.radians(value) if kind.unit == "rad" else value
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from peakflight.labelling import even_step
+from peakflight.labelling import FAR, drawn_borders, numbered_legs
 from peakflight.reporting.panels import Panel, Panels
 from peakflight.reporting.plots import ABOVE, AXIS, BELOW, Plot, placed, rounded
 from peakflight.result import Plan
@@ -17,12 +17,8 @@ CHARACTER = 6.6
 """Pixels of a character, on the safe side."""
 GAP = 0.22
 """Between panels, of the height of one."""
-MOST_BORDERS, MOST_NUMBERS = 60, 40
-"""With more legs, only every second, fifth, ... has its border drawn, and its number written."""
 HEADROOM = 1.18
 """Height of a panel's axis, relative to what it shows."""
-FAR = 4.0
-"""A bound that is further beyond the curves than this is named, but not drawn to scale."""
 
 
 def panels_plot(panels: Panels, plan: Plan) -> Plot:
@@ -198,7 +194,6 @@ def _bound_text(value: float, text: str, near: Sequence[float], axis: str, high:
 
 
 def _borders(passed: np.ndarray) -> list[Plot]:
-    inner = passed[1:-1]
     return [
         {
             "type": "line",
@@ -211,13 +206,12 @@ def _borders(passed: np.ndarray) -> list[Plot]:
             "line": {"color": "@faint", "width": 1},
             "layer": "below",
         }
-        for time in inner[:: even_step(len(inner), MOST_BORDERS)]
+        for time in drawn_borders(passed)
     ]
 
 
 def _leg_numbers(passed: np.ndarray) -> list[Plot]:
     """The numbers of the legs, on top."""
-    legs = len(passed) - 1
     return [
         {
             "text": f"leg {leg}" if leg == 0 else str(leg),
@@ -230,5 +224,5 @@ def _leg_numbers(passed: np.ndarray) -> list[Plot]:
             "showarrow": False,
             "font": {"color": "@soft", "size": 11},
         }
-        for leg in range(0, legs, even_step(legs, MOST_NUMBERS))
+        for leg in numbered_legs(len(passed) - 1)
     ]

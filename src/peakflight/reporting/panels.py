@@ -5,14 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from peakflight.curves import ALWAYS, inner_times, sampled_curves
-from peakflight.limits import KINDS, ROTORS, LimitKind, plain_unit
-from peakflight.result import BINDING, Plan
+from peakflight.curves import ALWAYS, inner_times, peaks, sampled_curves
+from peakflight.limits import KINDS, LEASTS, ROTORS, LimitKind
+from peakflight.result import Plan
 from peakflight.yaw import Heading
 from peakflight.yaw_certificate import unfit
 
-LEASTS = {"least_thrust_acceleration": "thrust_acceleration", "least_rotor_thrust": "rotor_thrust"}
-"""Limits from below, which are drawn in the panel of the limit from above."""
 WITH_VEHICLE = ("tilt", "body_rate", "angular_acceleration")
 """Shown of a plan that has a vehicle, whether they are limited or not."""
 
@@ -72,7 +70,7 @@ def limit_panels(plan: Plan) -> Panels:
         shown = kind.name in ALWAYS or (kind.name in WITH_VEHICLE and plan.vehicle is not None)
         leasts = [least for least, of in LEASTS.items() if of == kind.name]
         kinds = [one for one in KINDS if one.name in (kind.name, *leasts) and one in limits.active]
-        if kind.name in LEASTS or not (shown or kinds):
+        if kind.is_least or not (shown or kinds):
             continue
         if kind.name in ROTORS and plan.vehicle is not None:
             continue  # the thrust of every rotor is known
@@ -87,7 +85,7 @@ def limit_panels(plan: Plan) -> Panels:
                 ),
             ]
         marks = _marks(plan, kinds, curves)
-        panels.append(Panel(kind.label, _unit(kind), tuple(drawn), bounds, marks))
+        panels.append(Panel(kind.label, kind.shown_unit, tuple(drawn), bounds, marks))
     if plan.vehicle is not None:
         with suppress(ValueError):  # nothing is known of rotors where a file is far from a flight
             panels.append(_rotor_panel(plan))
@@ -114,7 +112,7 @@ def yaw_panels(plan: Plan) -> Panels | None:
         limit = heading.limits.get(kind)
         bounds = [] if limit is None else [_bound(kind, limit), Bound(-limit, "")]
         curve = Curve(kind.label, values, "ink")
-        panels.append(Panel(kind.label, _unit(kind), (curve,), tuple(bounds)))
+        panels.append(Panel(kind.label, kind.shown_unit, (curve,), tuple(bounds)))
     return Panels(times, tuple(panels))
 
 
@@ -153,24 +151,16 @@ def _marks(plan: Plan, kinds: list[LimitKind], curves: dict[str, np.ndarray]) ->
     """Where the curve of each segment that a limit binds, or that exceeds it, is at its peak."""
     places, exceeded, texts = [], [], []
     for kind in kinds:
-        kappa = plan.report.peaks[kind.name]
         values = curves[kind.name]
-        for segment in np.flatnonzero(kappa >= BINDING):
-            row = values[segment]
-            peak = row.argmin() if kind.name in LEASTS else row.argmax()
-            places.append(int(segment * values.shape[1] + peak))
-            exceeded.append(bool(kappa[segment] > 1.0))
+        for segment, place, kappa in zip(*peaks(plan, kind, values), strict=True):
+            places.append(int(segment * values.shape[1] + place))
+            exceeded.append(bool(kappa > 1.0))
             word = "exceeded" if exceeded[-1] else "binds"
-            texts.append(f"{kind.label} {word} in segment {segment}: {kappa[segment]:.6f} of it")
+            texts.append(f"{kind.label} {word} in segment {segment}: {kappa:.6f} of it")
     return Marks(np.array(places, dtype=int), np.array(exceeded, dtype=bool), texts)
 
 
 def _bound(kind: LimitKind, limit: float) -> Bound:
-    value = float(np.degrees(limit)) if kind.unit == "rad" else limit
-    unit = _unit(kind)
-    least = "at least " if kind.name in LEASTS else "limit "
+    value, unit = float(kind.shown(limit)), kind.shown_unit
+    least = "at least " if kind.is_least else "limit "
     return Bound(value, f"{least}{value:.5g}{'' if unit == '°' else ' '}{unit}")
-
-
-def _unit(kind: LimitKind) -> str:
-    return "°" if kind.unit == "rad" else plain_unit(kind.unit)
