@@ -213,7 +213,7 @@ def _bound(coefficients: np.ndarray, times: np.ndarray, limits: Limits) -> np.nd
 def _firsts(pieces: Sequence[int], segments: int) -> np.ndarray:
     """(legs,) first segment of each leg, from the number of pieces in each."""
     counts = np.array(pieces)
-    whole = np.issubdtype(counts.dtype, np.integer) and counts.ndim == 1
+    whole = counts.dtype.kind in "iu" and counts.ndim == 1
     if not (whole and (counts >= 1).all() and counts.sum() == segments):
         raise InvalidProblem(
             f"pieces must be whole numbers from 1 that add up to the {segments} segments"

@@ -116,7 +116,8 @@ def tidy(
     """
     if not (math.isfinite(tolerance) and tolerance >= 0.0):
         raise InvalidProblem(f"tolerance is {tolerance:g} m; it must be 0 or more, and finite")
-    gaps = np.linalg.norm(np.diff(course.waypoints, axis=0), axis=1)
+    steps = course.waypoints[1:] - course.waypoints[:-1]
+    gaps = np.sqrt((steps * steps).sum(axis=1))
     if not ((gaps < tolerance) | (gaps == 0.0)).any():
         return course, ()
     kept, merged = _merge(course.waypoints.tolist(), tolerance)

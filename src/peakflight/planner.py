@@ -13,7 +13,7 @@ from peakflight.course import Course, tidy
 from peakflight.errors import InvalidProblem, Status
 from peakflight.kernels import jit
 from peakflight.limits import Limits, keeps, limited_values
-from peakflight.problem import Problem, as_float_array
+from peakflight.problem import Problem
 from peakflight.result import PLAIN, Plan
 from peakflight.steering import Steered, steered
 from peakflight.version import __version__
@@ -228,6 +228,8 @@ def _reserving(method: str, problem: Problem, settings: Any) -> tuple[_Answer, f
 
 def _fastest(answers: list[_Answer]) -> _Answer:
     """The fastest flight, of the feasible ones if there are any, after what they all took."""
+    if len(answers) == 1:
+        return answers[0]
     outcome, flight = min(
         answers,
         key=lambda answer: (not answer[1].report.feasible, answer[1].trajectory.duration),
@@ -315,12 +317,8 @@ def tidied(
     """
     yaw = options.pop("yaw", None)
     heading = None if yaw is None else as_heading(yaw)
-    course, notes = tidy(
-        Course(
-            as_float_array("waypoints", waypoints, (None, 3)),
-            yaw=yaw if heading is None else heading.angles,  # type: ignore[arg-type]
-        )
-    )
+    asked = yaw if heading is None else heading.angles
+    course, notes = tidy(Course(waypoints, yaw=asked))  # type: ignore[arg-type]
     yaw = course.yaw if heading is None else heading.with_angles(course.yaw)
     if notes and options.get("derivatives"):
         raise InvalidProblem(

@@ -92,7 +92,7 @@ class Trajectory:
         times.setflags(write=False)
         return times
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Total time, s."""
         return float(self.segment_times.sum())
