@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -324,8 +325,18 @@ def test_the_vehicle_is_drawn_where_it_is_and_as_it_leans(vehicle: str | None) -
     assert drawing.path[0] == pytest.approx(course.waypoints[0])
     assert drawing.path[-1] == pytest.approx(course.waypoints[-1])
     for curve in drawing.curves:
-        for limit in curve.limits[:1]:
-            assert max(one.max() for one in curve.values) <= limit * (1.0 + 1e-9)
+        if getattr(plan.problem.limits, curve.name) is not None:
+            most = curve.limits[0]
+            assert max(one.max() for one in curve.values) <= most * (1.0 + 1e-9)
+
+
+def test_a_limit_from_below_alone_has_its_plot() -> None:
+    own = pf.find_vehicle("crazyflie-2.1-upgrade").on_rotors().limits
+    alone = replace(own, rotor_thrust=None, speed=3.0)
+    plan = pf.plan(replace(edited().problem, limits=alone), pieces=1)
+    (curve,) = [one for one in Drawing(plan, states(plan)).curves if one.name == "rotor_thrust"]
+    assert curve.limits == (own.least_rotor_thrust,)
+    assert min(one.min() for one in curve.values) >= curve.limits[0] * (1.0 - 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ def shown_kinds(limits: Limits, curves: dict[str, np.ndarray]) -> list[LimitKind
 def peaks(
     plan: Plan, kind: LimitKind, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where segments reach their limit or exceed it, by the certificate.
+    """Where segments reach their limit or exceed it, by the report; nowhere if it does not know.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 `Limits` is an open set: a kind is one entry of `KINDS`, one optional field of `Limits`, one unit
 in `kernels/measures.py` (what `peak` sees), one in `kernels/rows.py` (what `joint` sees) and one in
 `kernels/bounds.py` (what the certificate proves). Everything else, from the report to the command
-line, goes through `KINDS`.
+line, goes through `KINDS`, and `LEASTS` if it limits from below.
 
 Rotor thrusts follow from the motion and the airframe, for the worst heading. With the thrust T, of
 which drag is a part, the angular velocity w and acceleration alpha of its direction, the airframe's
@@ -42,6 +42,11 @@ class LimitKind(NamedTuple):
     def is_least(self) -> bool:
         """Whether it limits from below."""
         return self.name in LEASTS
+
+    @property
+    def leasts(self) -> tuple[str, ...]:
+        """Names of the limits from below on the same."""
+        return tuple(least for least, of in LEASTS.items() if of == self.name)
 
     @property
     def shown_unit(self) -> str:

@@ -12,6 +12,7 @@ from peakflight.cli.compare_output import print_comparisons
 from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.folder import OutputFolder, file_name
 from peakflight.cli.options import (
+    PAPERS,
     FolderPath,
     common_options,
     limits_option,
@@ -64,7 +65,7 @@ def _methods(
     help="Find about how fast any motion could be, too; takes seconds, and the extra bound.",
 )
 @vehicle_option
-@limits_option("Limits to keep.", default=PAPER_LIMITS)
+@limits_option("Limits to keep.", otherwise=PAPERS)
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option("--no-figures", is_flag=True, help="With -o, draw no pictures.")

@@ -8,6 +8,7 @@ import click
 
 from peakflight.cli.folder import OutputFolder
 from peakflight.cli.options import (
+    PAPERS,
     FolderPath,
     common_options,
     limits_option,
@@ -47,7 +48,7 @@ def _yaw_limits(
 @click.command("import", short_help="Prove, mend and retime a trajectory that others have made.")
 @click.argument("file", type=click.Path(path_type=Path))
 @vehicle_option
-@limits_option("Limits to keep; without them those of a plan file, else the paper's.")
+@limits_option("Limits to keep.", otherwise=f"those of a plan file, else {PAPERS}")
 @click.option(
     "--yaw-limits",
     metavar="NAME=VALUE,...",

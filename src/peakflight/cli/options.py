@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from peakflight.errors import InvalidProblem, quoted
-from peakflight.limits import KINDS, ROTORS, LimitKind, Limits
+from peakflight.limits import KINDS, PAPER_LIMITS, ROTORS, LimitKind, Limits
 from peakflight.numerals import as_number
 from peakflight.vehicle import Vehicle
 from peakflight.vehicles import VEHICLES, find_vehicle
@@ -93,18 +93,17 @@ def vehicle_option(command: _Command) -> _Command:
     )(command)
 
 
+PAPERS = f"the paper's {written(PAPER_LIMITS, ', ')}"
+"""What limits are by default where nothing else is known of them, in words."""
+
+
 def limits_option(
-    help: str, default: Limits | None = None, otherwise: str = "those in the file"
+    help: str, otherwise: str = "those in the file"
 ) -> Callable[[_Command], _Command]:
     """Option `--limits` of a command; it may be repeated, and is None if not given.
 
-    Parameters
-    ----------
-    default, otherwise
-        What the command takes then, for the help text: limits, or in words.
+    otherwise: in words, what the command takes then.
     """
-    if default is not None:
-        otherwise = f"the paper's {written(default, ', ')}"
     return click.option(
         "--limits",
         multiple=True,

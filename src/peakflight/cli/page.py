@@ -8,12 +8,11 @@ from pathlib import Path
 
 import click
 
-from peakflight.cli.options import common_options, limits_option, vehicle_option
+from peakflight.cli.options import PAPERS, common_options, limits_option, vehicle_option
 from peakflight.cli.output import print_json
 from peakflight.course import Course
-from peakflight.limits import PAPER_LIMITS, Limits
+from peakflight.limits import Limits
 from peakflight.vehicle import Vehicle
-from peakflight.wording import written
 
 FIRST_COURSE = (
     (0.0, 0.0, 1.0),
@@ -36,7 +35,7 @@ service, and from a terminal that is closed."""
 @vehicle_option
 @limits_option(
     "Limits to begin with.",
-    otherwise=f"those of the plan or vehicle, else the paper's {written(PAPER_LIMITS, ', ')}",
+    otherwise=f"those of the plan or vehicle, else {PAPERS}",
 )
 @click.option(
     "--host",

@@ -10,6 +10,7 @@ from peakflight.cli.courses import UNUSED_TIMES, read_tidied
 from peakflight.cli.export import FormatName
 from peakflight.cli.folder import OutputFolder, folder_for
 from peakflight.cli.options import (
+    PAPERS,
     FolderPath,
     common_options,
     limits_option,
@@ -99,7 +100,7 @@ class Pieces(click.ParamType):  # type: ignore[type-arg]
     "--time-limit", type=float, help="Of method joint: s, after which the best so far counts."
 )
 @vehicle_option
-@limits_option("Limits to keep.", default=PAPER_LIMITS)
+@limits_option("Limits to keep.", otherwise=PAPERS)
 @yaw_options
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")

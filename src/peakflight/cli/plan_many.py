@@ -14,6 +14,7 @@ from peakflight.cli.courses import read_tidied
 from peakflight.cli.exit_codes import BAD_INPUT
 from peakflight.cli.folder import file_name
 from peakflight.cli.options import (
+    PAPERS,
     FolderPath,
     common_options,
     limits_option,
@@ -69,7 +70,7 @@ class _Row:
     help="As of peakflight plan.",
 )
 @vehicle_option
-@limits_option("Limits to keep.", default=PAPER_LIMITS)
+@limits_option("Limits to keep.", otherwise=PAPERS)
 @spline_options
 @click.option("--strict", is_flag=True, help="Refuse waypoints that are nearly alike.")
 @click.option(

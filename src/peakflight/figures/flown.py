@@ -120,11 +120,10 @@ def _derivatives(lines: Sequence[_Line], title: str) -> Figure:
     panels = add_panels(figure, len(kinds))
     end = _end(lines)
     for kind, axes in zip(kinds, panels, strict=True):
-        in_units = np.degrees(1.0) if kind.unit == "rad" else 1.0
         tops = []
         for line in lines:
             curve = line.flown.analysis.curves[kind.name]
-            values = in_units * curve.flown
+            values = kind.shown(curve.flown)
             axes.plot(curve.times, values, zorder=3, **line.style)
             tops.append(float(np.nanmax(values, initial=0.0)))
         limit = getattr(first.plan.problem.limits, kind.name)

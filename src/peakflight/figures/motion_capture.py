@@ -74,8 +74,7 @@ def _derivatives(analysis: "FlightAnalysis", plan: Plan, title: str) -> Figure:
     panels = add_panels(figure, len(kinds))
     for kind, axes in zip(kinds, panels, strict=True):
         curve = analysis.curves[kind.name]
-        unit = np.degrees(1.0) if kind.unit == "rad" else 1.0
-        both = (unit * curve.flown, FLOWN), (unit * curve.planned, PLANNED)
+        both = (kind.shown(curve.flown), FLOWN), (kind.shown(curve.planned), PLANNED)
         for values, style in both:
             axes.plot(curve.times, values, zorder=3, **style)
         known = np.concatenate([values[np.isfinite(values)] for values, _ in both])

@@ -9,7 +9,7 @@ from peakflight.curves import sampled_curves, shown_kinds
 from peakflight.figures.canvas import TEXT, new_figure, write_title
 from peakflight.figures.derivatives import add_panels, panels_height, scale_panel
 from peakflight.figures.flights import LEGEND_TOP, Flight, legend_height, write_legend
-from peakflight.limits import Limits, plain_unit
+from peakflight.limits import Limits
 from peakflight.palette import INK
 
 ABOVE = 0.14
@@ -34,7 +34,7 @@ def overlaid_derivatives_figure(flights: Sequence[Flight], limits: Limits, *, ti
         limit = getattr(limits, kind.name)
         cut = CUT * limit if limit else np.inf
         if kind.unit != "rad" and highest > cut:
-            text = f"↑ {float(f'{highest:.3g}'):g}\n   {plain_unit(kind.unit)}"
+            text = f"↑ {float(f'{highest:.3g}'):g}\n   {kind.shown_unit}"
             axes.text(
                 1.012, 1.0, text, transform=axes.transAxes, va="top", fontsize=TEXT, color=INK
             )

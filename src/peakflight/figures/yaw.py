@@ -25,7 +25,6 @@ from peakflight.figures.derivatives import (
     draw_borders,
     number_legs,
 )
-from peakflight.limits import plain_unit
 from peakflight.palette import INK, SOFT
 from peakflight.result import Plan
 from peakflight.twist import turning_about_z
@@ -81,7 +80,7 @@ def yaw_figure(plan: Plan) -> Figure:
     else:
         curves = plan.yaw(times, derivative=1), plan.yaw(times, derivative=2)
     for kind, axes, values in zip(heading.kinds, panels[1:], curves, strict=True):
-        unit = plain_unit(kind.unit)
+        unit = kind.shown_unit
         _name(axes, f"{kind.label.replace(' about z', chr(10) + 'about z')}\n({unit})")
         axes.plot(times, values, color=INK, linewidth=1.0, zorder=3)
         _draw_limit(axes, float(np.abs(values).max()), heading.limits.get(kind), unit)

@@ -28,7 +28,8 @@ METHODS = {
 DEFAULT_METHOD = "joint"
 """What plans where none is named."""
 OTHER_STARTS: tuple[Literal["peak", "proportional"], ...] = ("peak", "proportional")
-"""From where `joint` begins again if its guess leads to much less than it promised."""
+"""From where `joint` is begun again under limits on rotors, if its guess leads nowhere, to a flight
+much slower than it promised, or to one that its yaw slows much."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -30,7 +30,7 @@ def made_feasible(task: Task, runs: list[Run]) -> Outcome:
     best: Outcome | None = None
     tried: list[int] = []
     for run in sorted(runs, key=lambda run: run.objective):
-        if task.turns and tried.count(len(run.trajectory)) == ALIKE:
+        if task.may_miss and tried.count(len(run.trajectory)) == ALIKE:
             continue
         tried.append(len(run.trajectory))
         if task.problem.is_at_rest:

@@ -49,8 +49,8 @@ class Task:
         return time.perf_counter() >= self.deadline
 
     @property
-    def turns(self) -> bool:
-        """Whether a stretch turns F, so that answers may be much slower than their runs."""
+    def may_miss(self) -> bool:
+        """Whether answers may be much slower than their runs: a stretch turns the thrust."""
         return self.problem.is_at_rest and self.problem.limits.figures is not None
 
     @property
@@ -59,7 +59,7 @@ class Task:
 
         It is not with motion that is fixed, nor for rotors.
         """
-        return self.problem.is_at_rest and not self.turns
+        return self.problem.is_at_rest and not self.may_miss
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Run:
     ended: bool
     """Whether it met its own tolerance."""
     solved: bool
-    """Whether it met that of the settings."""
+    """Whether it met that of the task."""
     code: int
     iterations: int
     dual: np.ndarray

@@ -60,7 +60,8 @@ time that it takes to find out."""
 FEW = 4
 """Legs up to which one polynomial a leg, at rest in jerk too, may be slower than the spline."""
 MISSED = 0.02
-"""Part of the time by which an answer under limits on rotors is then slower than its best run."""
+"""Part of the time by which an answer under limits on rotors may be slower than its best run,
+before other starts are tried."""
 RETRIES = 4
 """Runs from where a run has stalled; a new barrier often gets it going."""
 TIE = 1e-8
@@ -130,11 +131,11 @@ def solve(problem: Problem, settings: Settings) -> Outcome:
     deadline = time.perf_counter() + limit
     completed = complete(problem)
     task = Task(
-        completed,
-        _effort(completed, settings),
-        settings.tolerance,
-        settings.iterations,
-        deadline,
+        problem=completed,
+        effort=_effort(completed, settings),
+        tolerance=settings.tolerance,
+        iterations=settings.iterations,
+        deadline=deadline,
     )
     legs = len(completed.waypoints) - 1
     if settings.max_pieces is not None and settings.max_pieces < legs:
@@ -179,7 +180,7 @@ def _best(task: Task, problem: Problem, settings: Settings) -> Outcome:
         promised = min(run.objective for run in runs)
         has_ended = any(run.ended for run in runs)
         is_kept = has_ended and found.trajectory.duration <= (1.0 + MISSED) * promised
-        is_free = settings.initial == "guess" and task.turns
+        is_free = settings.initial == "guess" and task.may_miss
         if (is_kept and found.status is not Status.INFEASIBLE) or not is_free or task.is_late:
             break
     best = min(answers, key=lambda one: (one.status is Status.INFEASIBLE, one.trajectory.duration))
@@ -211,7 +212,7 @@ def _runs(task: Task, problem: Problem, settings: Settings) -> list[Run]:
     elif isinstance(settings.initial, Plan):
         begin = WARM
         cuts = cuts and not (start.pieces > 1).any()
-    runs = [run_interior(task, start, begin, ROUGH if cuts else settings.tolerance)]
+    runs = [run_interior(task, start, begin, ROUGH if cuts else None)]
     has_stalled = cuts and not runs[0].ended
     if has_stalled:
         runs.append(run_from(task, runs[0], GOING_ON))
@@ -280,7 +281,7 @@ def _is_short(task: Task, run: Run, settings: Settings) -> bool:
         return False
     if not (len(run.pieces) < most <= MOST_EXCHANGED and task.problem.is_at_rest):
         return False
-    if settings.exchanges == 0 or task.turns:  # samples do not say then what is faster
+    if settings.exchanges == 0 or task.may_miss:  # samples do not say then what is faster
         return False
     return _idle(task, run, settings) is not None
 
@@ -294,7 +295,7 @@ def _exchanged(task: Task, run: Run, settings: Settings) -> list[Run]:
         if task.is_late:
             return None
         start = start_of(trajectory, pieces, task.problem)
-        tried = run_interior(task, start, GOING_ON, max(settings.tolerance, TRIAL))
+        tried = run_interior(task, start, GOING_ON, max(task.tolerance, TRIAL))
         spent += tried.iterations
         return tried
 

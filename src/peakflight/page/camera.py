@@ -1,6 +1,5 @@
 """Where cameras stand: at first, after another course is loaded, and when asked to show it all."""
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,13 +71,13 @@ def framing(points: np.ndarray, aspect: float, side: str = USUAL) -> tuple[np.nd
     return middle + distance * towards, middle
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class _Framed:
     """How a camera was framed last."""
 
     aspect: float
     side: str
-    places: deque[np.ndarray]
+    places: tuple[np.ndarray, ...]
     """(3,) m, where it has been put of late: what a browser tells may be older than the last."""
 
 
@@ -116,8 +115,9 @@ class Cameras:
         camera = client.camera
         aspect = camera.aspect
         position, middle = framing(self._points, aspect, side)
-        places = self._framed[client.client_id].places if client.client_id in self._framed else ()
-        self._framed[client.client_id] = _Framed(aspect, side, deque([*places, position], RECENT))
+        last = self._framed.get(client.client_id)
+        places = (*(last.places if last else ()), position)[-RECENT:]
+        self._framed[client.client_id] = _Framed(aspect, side, places)
         near, far = _drawn(position, middle)
         with client.atomic():
             camera.fov, camera.near, camera.far = float(FOV), near, far

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from peakflight.curves import ALWAYS
-from peakflight.limits import KINDS, LEASTS, limited_values
+from peakflight.limits import KINDS, ROTORS, limited_values
 from peakflight.page import states
 from peakflight.page.colours import along_scale
 from peakflight.result import BINDING, Plan
@@ -149,21 +149,21 @@ class Drawing:
         begin = plan.trajectory.start_time
         times = np.clip(begin + self.curve_times, begin, plan.trajectory.end_time)
         derivatives = [plan.trajectory(times, order) for order in (1, 2, 3, 4)]
-        values = limited_values(derivatives)
+        known = plan.vehicle is not None  # else it is drawn by another's rotors
+        values = limited_values(derivatives, None if known else limits.airframe)
         curves = []
         for kind in KINDS:
-            kinds = (kind.name, *(least for least, of in LEASTS.items() if of == kind.name))
-            bounds = [getattr(limits, name) for name in kinds]
+            bounds = [getattr(limits, name) for name in (kind.name, *kind.leasts)]
             lines = tuple(float(kind.shown(bound)) for bound in bounds if bound is not None)
             if kind.is_least or not (lines or kind.name in ALWAYS):
                 continue
-            if kind.name == "rotor_thrust":
-                shown: tuple[np.ndarray, ...] = tuple(
-                    np.interp(times, self.path_times, thrust)
-                    for thrust in self.states.rotor_thrust.T
-                )
+            if kind.name not in ROTORS:
+                shown: tuple[np.ndarray, ...] = (kind.shown(values[kind.name]),)
+            elif known:
+                thrusts = self.states.rotor_thrust.T
+                shown = tuple(np.interp(times, self.path_times, thrust) for thrust in thrusts)
             else:
-                shown = (kind.shown(values[kind.name]),)
+                shown = tuple(values[name] for name in ROTORS)
             title = f"{kind.label[0].upper()}{kind.label[1:]} ({kind.shown_unit})"
             curves.append(Curve(kind.name, title, shown, lines))
         return tuple(curves)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from peakflight.curves import ALWAYS, inner_times, peaks, sampled_curves
-from peakflight.limits import KINDS, LEASTS, ROTORS, LimitKind
+from peakflight.limits import KINDS, ROTORS, LimitKind
 from peakflight.result import Plan
 from peakflight.yaw import Heading
 from peakflight.yaw_certificate import unfit
@@ -68,8 +68,8 @@ def limit_panels(plan: Plan) -> Panels:
     panels = []
     for kind in KINDS:
         shown = kind.name in ALWAYS or (kind.name in WITH_VEHICLE and plan.vehicle is not None)
-        leasts = [least for least, of in LEASTS.items() if of == kind.name]
-        kinds = [one for one in KINDS if one.name in (kind.name, *leasts) and one in limits.active]
+        names = (kind.name, *kind.leasts)
+        kinds = [one for one in limits.active if one.name in names]
         if kind.is_least or not (shown or kinds):
             continue
         if kind.name in ROTORS and plan.vehicle is not None:
