@@ -83,23 +83,27 @@ def prepare_folder(path: PathLike) -> Path:
     return folder
 
 
-def read_json(path: PathLike) -> Any:
+def read_json(path: PathLike, what: str = "") -> Any:
     """The value that a JSON file holds; numbers must be finite.
+
+    what: the file should be, for messages.
 
     Raises
     ------
     InvalidFile
         As `read_text`, or if it is not JSON.
     """
-    return parse_json(read_text(path), path)
+    return parse_json(read_text(path), path, what)
 
 
-def parse_json(text: str, path: PathLike) -> Any:
-    """The value of JSON `text`; `path` is named in errors."""
+def parse_json(text: str, path: PathLike, what: str = "") -> Any:
+    """The value of JSON `text`; `path`, and what it should be, are named in errors."""
     try:
         return json.loads(text, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
-        raise InvalidFile(f"{path}: line {error.lineno} is not JSON ({error.msg})") from None
+        rule = f", which {what} is" if what else ""
+        line = f"{path}: line {error.lineno} is not JSON ({error.msg}){rule}"
+        raise InvalidFile(line) from None
     except RecursionError:
         raise InvalidFile(f"{path}: is not JSON that can be read (nested too deeply)") from None
     except ValueError as error:

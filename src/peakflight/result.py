@@ -321,10 +321,15 @@ class Plan:
         InvalidFile
             If it cannot be read or is not a plan; the message names the key and the rule.
         """
-        values = read_json(path)
+        return cls.load_with_claims(path)[0]
+
+    @classmethod
+    def load_with_claims(cls, path: PathLike) -> tuple[Self, Any]:
+        """The same, and all that the file says."""
+        values = read_json(path, "a plan file")
         try:
-            return cls.from_dict(values)
-        except InvalidProblem as error:
+            return cls.from_dict(values), values
+        except (ValueError, OverflowError) as error:
             raise InvalidFile(f"{Path(path)}: {error}") from None
 
 

@@ -12,8 +12,6 @@ from peakflight.cli.options import common_options, limits_option
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
 from peakflight.cli.verdict import COLUMNS, limit_rows
-from peakflight.errors import InvalidFile
-from peakflight.files import read_json
 from peakflight.limits import Limits
 from peakflight.problem import derivative_name
 from peakflight.result import JOINT_TOLERANCE, Plan, Report, allowed_miss
@@ -37,11 +35,7 @@ def check(file: Path, limits: Limits | None, as_json: bool) -> int:
     """  # noqa: D301
     with Progress() as progress:
         progress.stage(f"checking {file.name}")
-        values = read_json(file)
-        try:
-            plan = Plan.from_dict(values)
-        except (ValueError, OverflowError) as error:
-            raise InvalidFile(f"{file}: {error}") from None
+        plan, values = Plan.load_with_claims(file)
         from peakflight.certificate import certify_plan
 
         report = certify_plan(plan)

@@ -8,8 +8,7 @@ from peakflight.cli.inputs import keep_inputs
 from peakflight.cli.options import common_options
 from peakflight.cli.output import Printout, print_json
 from peakflight.cli.progress import Progress
-from peakflight.errors import InvalidFile
-from peakflight.files import read_json, write_atomically
+from peakflight.files import write_atomically
 from peakflight.result import Plan
 from peakflight.wording import seconds
 
@@ -41,11 +40,7 @@ def report(file: Path, output: Path | None, title: str | None, as_json: bool) ->
     """  # noqa: D301
     with Progress() as progress:
         progress.stage(f"reading {file.name}")
-        values = read_json(file)
-        try:
-            plan = Plan.from_dict(values)
-        except (ValueError, OverflowError) as error:
-            raise InvalidFile(f"{file}: {error}") from None
+        plan, values = Plan.load_with_claims(file)
         path = output or file.parent / "report.html"
         keep_inputs(path, [file])
         progress.stage("loading the planner")
