@@ -112,12 +112,6 @@ class Visit:
             time.sleep(0.05)
         mouse.up()
 
-    def reshape(self, width: int, height: int) -> None:
-        """Change the window to a shape that it does not have, in pixels."""
-        before = self.client.camera.aspect
-        self.tab.set_viewport_size({"width": width, "height": height})
-        until(lambda: self.client.camera.aspect != before, "another shape")
-
     def open(self, tab: str) -> None:
         self.tab.get_by_role("tab", name=tab).click()
 
@@ -250,27 +244,6 @@ def test_a_broken_upload_is_refused_with_words_and_all_stays(
     assert "/tmp" not in page.tab.inner_text("[data-file]")
     page.picture(screenshots, "refused")
     assert server.page.edited is before
-
-
-def test_a_view_that_nobody_moved_stays_framed_when_its_window_changes(
-    visit: Callable[..., Visit], server: PageServer
-) -> None:
-    page = visit()
-    waypoints = server.page.edited.waypoints
-    until(lambda: page.sees(waypoints), "the course is framed")
-    for width, height in ((1500, 700), (1000, 900), (1250, 620), (1600, 1000), (1050, 800)):
-        page.reshape(width, height)
-    until(lambda: page.sees(waypoints), "the course is framed again")
-    framed = page.client.camera.position
-    box = page.view()
-    page.tab.mouse.move(box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0)
-    page.tab.mouse.wheel(0.0, -400.0)
-    until(lambda: not np.allclose(page.client.camera.position, framed), "someone comes nearer")
-    time.sleep(1.0)  # the camera comes to rest
-    nearer = page.client.camera.position
-    page.reshape(1400, 700)
-    time.sleep(1.0)
-    assert np.allclose(page.client.camera.position, nearer)
 
 
 def test_two_clients_see_the_same_course(visit: Callable[..., Visit], server: PageServer) -> None:
