@@ -26,7 +26,7 @@ COURSES = (*ROOMS, "uzh_19wp.json")
 ERROR = 0.2
 """RMS error up to which a plan counts as flown, m."""
 AGREE = 0.95
-PLANS, QUICK_PLANS = 208, 16
+PLANS, QUICK_PLANS = 208, 8
 SETTINGS = pf.FlySettings(ground=None)
 """Splines between waypoints near the ground may dip below it: no matter here."""
 
