@@ -2,16 +2,19 @@
 
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import peakflight as pf
 from peakflight import Limits, Trajectory
+from peakflight.limits import PAPER_LIMITS
 from peakflight.methods import interior_run, joint
 from peakflight.methods.exchange import TRIES, exchanged
 from peakflight.methods.merging import changes, merge, merged
 
+COURSES = Path(__file__).parent.parent / "examples" / "courses"
 LIMITS = Limits(speed=1.0)
 ALLOWED = 1e-3
 """Relative: what separates two solutions of one problem."""
@@ -218,3 +221,12 @@ def test_bad_exchanges_are_refused() -> None:
     for bad, words in ((-1, "must be from 0"), (2.5, "must be a whole number")):
         with pytest.raises(pf.InvalidProblem, match=f"setting exchanges is {bad}; it {words}"):
             joint.Settings(exchanges=bad)
+
+
+def test_a_history_holds_runs_of_the_same_pieces_alone() -> None:
+    course = pf.read_course(COURSES / "uzh_19wp.json")
+    plan = pf.plan(course.waypoints, limits=PAPER_LIMITS, max_pieces=31)
+    assert plan.history is not None
+    firsts = np.cumsum(plan.pieces) - plan.pieces
+    legs = np.add.reduceat(plan.history.segment_times, firsts, axis=1)
+    assert np.abs(legs / np.diff(plan.waypoint_times) - 1.0).max() < 0.2

@@ -307,7 +307,7 @@ def _exchanged(task: Task, run: Run, settings: Settings) -> list[Run]:
 
 
 def _history(runs: list[Run]) -> History:
-    """Segment times of the runs that had as many pieces as the last."""
-    count = len(runs[-1].trajectory)
-    alike = [run.trajectory.segment_times for run in runs if len(run.trajectory) == count]
+    """Segment times of the runs that had their pieces where the last has."""
+    last = runs[-1].pieces
+    alike = [run.trajectory.segment_times for run in runs if np.array_equal(run.pieces, last)]
     return History(segment_times=np.array(alike))
